@@ -1,0 +1,3 @@
+//! Node: an MCAP bag to its topics and /clock.
+
+fn main() {}

@@ -1,0 +1,3 @@
+//! Node: road pictures to a friction prior.
+
+fn main() {}

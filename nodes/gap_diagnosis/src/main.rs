@@ -1,0 +1,3 @@
+//! Node: where model and car disagree, and why.
+
+fn main() {}

@@ -1,0 +1,3 @@
+//! The command line: identify, diagnose, friction, simulate, withheld, bag.
+
+fn main() {}

@@ -1,0 +1,3 @@
+//! Node: residual models and a friction prior to Pacejka parameters.
+
+fn main() {}

@@ -1,0 +1,1 @@
+//! Road pictures to a friction prior: decoding, quality gates, network, filter over distance.

@@ -1,0 +1,1 @@
+//! Pages and pictures: the one look of every gripsight report.

@@ -1,0 +1,1 @@
+//! S4D layer with analytic gradients, residual networks and their trainer.

@@ -1,0 +1,1 @@
+//! What the car reported: telemetry samples, alignment, windows, resampling, data health.

@@ -1,0 +1,1 @@
+//! Single-track model, Magic Formula, vehicle parameters, integrators, handling numbers.

@@ -1,0 +1,1 @@
+//! What a node needs from ROS 2 and ros2-client lacks.

@@ -1,0 +1,3 @@
+//! Node: state sequences and a candidate to a learned residual model.
+
+fn main() {}

@@ -1,0 +1,3 @@
+//! Node: the reference car, live on topics.
+
+fn main() {}

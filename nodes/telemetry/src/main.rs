@@ -1,0 +1,3 @@
+//! Node: odometry and steering to state sequences.
+
+fn main() {}

@@ -1,0 +1,1 @@
+//! Topic-level integration tests with real DDS peers, and published results.
