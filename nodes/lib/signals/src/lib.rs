@@ -1,1 +1,30 @@
-//! What the car reported: telemetry samples, alignment, windows, resampling, data health.
+//! What the car reported, and nothing about why.
+//!
+//! The way of the data: [`Measurement`]s of several topics, each with its own stamps, are put on the stamps of the odometry
+//! by the [`Aligner`]; the [`WindowCutter`] cuts the aligned [`TelemetrySample`]s into [`StateSequence`]s (float32, the unit of
+//! work of the whole suite, live and offline); [`segments`] turns a sequence into evenly sampled stretches without gaps;
+//! [`DataHealth`] says what is wrong with it.
+//!
+//! Frames follow REP-103: x forward, y left, z up; left steer and left yaw are positive.
+
+mod align;
+mod error;
+mod health;
+mod measurement;
+mod segment;
+mod sequence;
+mod window;
+
+pub use align::{AlignConfig, Aligner};
+pub use error::SignalError;
+pub use health::{DataHealth, FrozenSpan, Gap};
+pub use measurement::{DriveSample, ImuSample, Measurement, OdometrySample, TelemetrySample, WheelsSample};
+pub use segment::{Segment, segments};
+pub use sequence::StateSequence;
+pub use window::{WindowConfig, WindowCutter};
+
+/// Nanoseconds in a second.
+pub const NS_PER_S: f64 = 1e9;
+
+/// The wheels' order in every array of four: front left, front right, rear left, rear right.
+pub const WHEELS: [&str; 4] = ["front_left", "front_right", "rear_left", "rear_right"];

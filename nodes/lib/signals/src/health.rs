@@ -1,0 +1,141 @@
+//! What is wrong with the data, before anything is concluded from them.
+
+use serde::Serialize;
+
+use crate::{SignalError, StateSequence, segment};
+
+/// A pause in the samples.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Gap {
+    /// Last sample before it, since the start of the sequence.
+    pub from_s: f64,
+    /// First sample after it.
+    pub to_s: f64,
+}
+
+/// A sensor that reported the very same values while the car was moving.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FrozenSpan {
+    /// Which channel.
+    pub channel: &'static str,
+    /// Since the start of the sequence.
+    pub from_s: f64,
+    /// Since the start of the sequence.
+    pub to_s: f64,
+}
+
+/// Figures about a sequence's samples.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DataHealth {
+    /// Samples in the sequence.
+    pub samples: usize,
+    /// From the first to the last.
+    pub duration_s: f64,
+    /// One over the median step.
+    pub rate_hz: f64,
+    /// Standard deviation of the steps that are no gaps.
+    pub jitter_s: f64,
+    /// Pauses over 2.5 median steps.
+    pub gaps: Vec<Gap>,
+    /// Channels that stood still for over half a second at speed.
+    pub frozen: Vec<FrozenSpan>,
+    /// Share of the time in which the car moved (over 0.3 m/s).
+    pub moving_share: f64,
+    /// Optional channels that are there.
+    pub recorded: Vec<&'static str>,
+}
+
+/// A real sensor does not repeat itself to the last digit for this long.
+const FROZEN_S: f64 = 0.5;
+/// Below this the car stands, and a sensor may well repeat itself.
+const MOVING_MPS: f32 = 0.3;
+
+impl DataHealth {
+    /// Looks at a sequence.
+    ///
+    /// # Errors
+    /// What [`StateSequence::check`] finds.
+    pub fn of(sequence: &StateSequence) -> Result<Self, SignalError> {
+        sequence.check()?;
+        let time_s = &sequence.time_s;
+        let dt_s = segment::median_step_s(time_s);
+        let steps = time_s.windows(2).map(|w| (f64::from(w[0]), f64::from(w[1])));
+        let is_gap = |from_s: f64, to_s: f64| to_s - from_s > segment::GAP_STEPS * dt_s;
+        let gaps =
+            steps.clone().filter(|&(a, b)| is_gap(a, b)).map(|(from_s, to_s)| Gap { from_s, to_s }).collect();
+        let regular: Vec<f64> = steps.filter(|&(a, b)| !is_gap(a, b)).map(|(a, b)| b - a).collect();
+        let mean = regular.iter().sum::<f64>() / regular.len().max(1) as f64;
+        let variance = regular.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / regular.len().max(1) as f64;
+        let moving = sequence.v_x_mps.iter().filter(|v| v.abs() > MOVING_MPS).count();
+        Ok(Self {
+            samples: sequence.len(),
+            duration_s: sequence.duration_s(),
+            rate_hz: 1.0 / dt_s,
+            jitter_s: variance.sqrt(),
+            gaps,
+            frozen: frozen(sequence),
+            moving_share: moving as f64 / sequence.len() as f64,
+            recorded: sequence
+                .channels()
+                .into_iter()
+                .skip(5)
+                .filter(|(_, c)| !c.is_empty())
+                .map(|(n, _)| n)
+                .collect(),
+        })
+    }
+}
+
+fn frozen(sequence: &StateSequence) -> Vec<FrozenSpan> {
+    let measured = ["v_x_mps", "v_y_mps", "yaw_rate_radps", "x_m", "a_y_mps2", "gyro_yaw_rate_radps"];
+    let mut spans = Vec::new();
+    for (channel, values) in sequence.channels() {
+        // A channel that is constant throughout is not measured at all; what that means is for the user of it to say.
+        let constant = values.iter().all(|v| Some(v) == values.first());
+        if !measured.contains(&channel) || values.is_empty() || constant {
+            continue;
+        }
+        let mut start = 0;
+        for k in 1..=values.len() {
+            if k < values.len() && values[k] == values[start] && sequence.v_x_mps[k].abs() > MOVING_MPS {
+                continue;
+            }
+            let (from_s, to_s) = (f64::from(sequence.time_s[start]), f64::from(sequence.time_s[k - 1]));
+            if to_s - from_s > FROZEN_S {
+                spans.push(FrozenSpan { channel, from_s, to_s });
+            }
+            start = k.min(values.len() - 1);
+        }
+    }
+    spans
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gaps_jitter_and_frozen_channels_are_found() {
+        let mut time_s: Vec<f32> = (0..300).map(|k| k as f32 * 0.01).collect();
+        time_s.extend((0..300).map(|k| 4.0 + k as f32 * 0.01));
+        let wave = |f: f32| time_s.iter().map(|t| (f * t).sin()).collect::<Vec<_>>();
+        let mut v_y_mps = wave(3.0);
+        let stuck = v_y_mps[100];
+        v_y_mps[100..180].fill(stuck);
+        let sequence = StateSequence {
+            v_x_mps: time_s.iter().map(|t| 5.0 + 0.1 * t).collect(),
+            yaw_rate_radps: wave(2.0),
+            steering_rad: wave(1.0),
+            v_y_mps,
+            time_s: time_s.clone(),
+            ..Default::default()
+        };
+        let health = DataHealth::of(&sequence).unwrap();
+        assert_eq!(health.gaps.len(), 1);
+        approx::assert_relative_eq!(health.rate_hz, 100.0, max_relative = 1e-3);
+        assert_eq!(health.frozen.len(), 1);
+        assert_eq!(health.frozen[0].channel, "v_y_mps");
+        approx::assert_abs_diff_eq!(health.frozen[0].from_s, 1.0, epsilon = 1e-3);
+        assert_eq!(health.moving_share, 1.0);
+    }
+}

@@ -1,0 +1,148 @@
+//! One message each, freed of ROS: stamp in nanoseconds, SI units, REP-103 frames.
+
+use crate::{NS_PER_S, SignalError};
+
+/// Pose in a fixed frame and velocity in the car's frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct OdometrySample {
+    /// Time of the measurement.
+    pub stamp_ns: i64,
+    /// Position in the map.
+    pub x_m: f64,
+    /// Position in the map.
+    pub y_m: f64,
+    /// Heading in the map, in (-pi, pi].
+    pub yaw_rad: f64,
+    /// Forward velocity.
+    pub v_x_mps: f64,
+    /// Velocity to the left, at whatever point the estimator takes.
+    pub v_y_mps: f64,
+    /// Yaw rate.
+    pub yaw_rate_radps: f64,
+}
+
+/// What the driver asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DriveSample {
+    /// Time of the command.
+    pub stamp_ns: i64,
+    /// Road-wheel angle, or its command.
+    pub steering_angle_rad: f64,
+    /// Commanded speed.
+    pub speed_mps: f64,
+    /// Commanded acceleration; zero throughout where the stack does not use it.
+    pub acceleration_mps2: f64,
+}
+
+/// Inertial measurement.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ImuSample {
+    /// Time of the measurement.
+    pub stamp_ns: i64,
+    /// Specific force forward.
+    pub a_x_mps2: f64,
+    /// Specific force to the left.
+    pub a_y_mps2: f64,
+    /// Yaw rate of the gyroscope.
+    pub yaw_rate_radps: f64,
+}
+
+/// Wheel speeds, and torques where recorded; order of [`crate::WHEELS`].
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct WheelsSample {
+    /// Time of the measurement.
+    pub stamp_ns: i64,
+    /// As reported: rad/s of a ROS JointState, or m/s where a stack writes that.
+    pub speed: [f64; 4],
+    /// Wheel torque in N m, where recorded.
+    pub effort_nm: Option<[f64; 4]>,
+}
+
+/// A message of one of the streams.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Measurement {
+    /// Odometry: the clock of the sequence.
+    Odometry(OdometrySample),
+    /// Drive command.
+    Drive(DriveSample),
+    /// Inertial unit, optional.
+    Imu(ImuSample),
+    /// Wheels, optional.
+    Wheels(WheelsSample),
+}
+
+impl Measurement {
+    /// Time of the measurement.
+    #[must_use]
+    pub fn stamp_ns(&self) -> i64 {
+        match self {
+            Self::Odometry(m) => m.stamp_ns,
+            Self::Drive(m) => m.stamp_ns,
+            Self::Imu(m) => m.stamp_ns,
+            Self::Wheels(m) => m.stamp_ns,
+        }
+    }
+
+    /// The stream's role, as topics name it.
+    #[must_use]
+    pub fn stream(&self) -> &'static str {
+        ["odom", "drive", "imu", "wheels"][self.stream_index()]
+    }
+
+    pub(crate) fn stream_index(&self) -> usize {
+        match self {
+            Self::Odometry(_) => 0,
+            Self::Drive(_) => 1,
+            Self::Imu(_) => 2,
+            Self::Wheels(_) => 3,
+        }
+    }
+
+    /// # Errors
+    /// [`SignalError::NotFinite`] names the first field that is NaN or infinite; `index` is the message's place in its stream.
+    pub fn check_finite(&self, index: usize) -> Result<(), SignalError> {
+        let topic = self.stream();
+        let stamp_s = self.stamp_ns() as f64 / NS_PER_S;
+        let check = |fields: &[(&'static str, f64)]| match fields.iter().find(|(_, v)| !v.is_finite()) {
+            Some(&(field, value)) => Err(SignalError::NotFinite { topic, field, value, stamp_s, index }),
+            None => Ok(()),
+        };
+        match self {
+            Self::Odometry(m) => check(&[
+                ("x_m", m.x_m),
+                ("y_m", m.y_m),
+                ("yaw_rad", m.yaw_rad),
+                ("v_x_mps", m.v_x_mps),
+                ("v_y_mps", m.v_y_mps),
+                ("yaw_rate_radps", m.yaw_rate_radps),
+            ]),
+            Self::Drive(m) => check(&[
+                ("steering_angle_rad", m.steering_angle_rad),
+                ("speed_mps", m.speed_mps),
+                ("acceleration_mps2", m.acceleration_mps2),
+            ]),
+            Self::Imu(m) => check(&[
+                ("a_x_mps2", m.a_x_mps2),
+                ("a_y_mps2", m.a_y_mps2),
+                ("yaw_rate_radps", m.yaw_rate_radps),
+            ]),
+            Self::Wheels(m) => {
+                check(&m.speed.map(|v| ("wheel speed", v)))?;
+                m.effort_nm.map_or(Ok(()), |e| check(&e.map(|v| ("wheel effort", v))))
+            }
+        }
+    }
+}
+
+/// Everything known at one odometry stamp.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct TelemetrySample {
+    /// The odometry message of this instant.
+    pub odometry: OdometrySample,
+    /// The drive command in force.
+    pub drive: DriveSample,
+    /// Inertial unit, interpolated to this instant; `None` without one.
+    pub imu: Option<ImuSample>,
+    /// Wheels, interpolated to this instant; `None` without them.
+    pub wheels: Option<WheelsSample>,
+}

@@ -1,0 +1,119 @@
+//! Cuts aligned telemetry into sequences, by stamps.
+
+use crate::{NS_PER_S, SignalError, StateSequence, TelemetrySample};
+
+/// How windows are cut.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WindowConfig {
+    /// Length of a window; infinite: one window to the end of the data.
+    pub length_s: f64,
+    /// From the start of a window to the start of the next.
+    pub hop_s: f64,
+}
+
+impl Default for WindowConfig {
+    /// The paper collects 30 s of telemetry.
+    fn default() -> Self {
+        Self { length_s: 30.0, hop_s: 30.0 }
+    }
+}
+
+/// Buffers samples and gives out a [`StateSequence`] whenever a window is full.
+///
+/// A window runs from its first sample up to, not including, the first sample at least `length_s` later; the next one starts
+/// at the first sample at least `hop_s` after the start of this one.
+#[derive(Debug, Clone)]
+pub struct WindowCutter {
+    config: WindowConfig,
+    buffer: Vec<TelemetrySample>,
+}
+
+impl WindowCutter {
+    /// # Errors
+    /// [`SignalError::Config`] where a length is not positive, or the hop is longer than the window.
+    pub fn new(config: WindowConfig) -> Result<Self, SignalError> {
+        if config.length_s.is_nan() || config.length_s <= 0.0 {
+            return Err(SignalError::Config { name: "length_s", must: "positive", got: config.length_s });
+        }
+        if config.hop_s.is_nan() || config.hop_s <= 0.0 || config.hop_s > config.length_s {
+            return Err(SignalError::Config {
+                name: "hop_s",
+                must: "positive and at most length_s",
+                got: config.hop_s,
+            });
+        }
+        Ok(Self { config, buffer: Vec::new() })
+    }
+
+    /// Takes a sample; gives the window that it closes.
+    pub fn push(&mut self, sample: TelemetrySample) -> Option<StateSequence> {
+        let full = self.buffer.first().is_some_and(|first| elapsed_s(first, &sample) >= self.config.length_s);
+        let closed = if full { StateSequence::from_samples(&self.buffer).ok() } else { None };
+        if full {
+            let start = self.buffer[0];
+            self.buffer.retain(|s| elapsed_s(&start, s) >= self.config.hop_s);
+        }
+        self.buffer.push(sample);
+        closed
+    }
+
+    /// The window still open.
+    ///
+    /// # Errors
+    /// [`SignalError::TooShort`] where it holds fewer than two samples.
+    pub fn rest(&self) -> Result<StateSequence, SignalError> {
+        StateSequence::from_samples(&self.buffer)
+    }
+
+    /// Samples in the window still open.
+    #[must_use]
+    pub fn buffered(&self) -> usize {
+        self.buffer.len()
+    }
+
+    /// Forgets everything: after the clock jumped back, nothing old may be mixed with what comes.
+    pub fn clear(&mut self) {
+        self.buffer.clear();
+    }
+}
+
+fn elapsed_s(from: &TelemetrySample, to: &TelemetrySample) -> f64 {
+    (to.odometry.stamp_ns - from.odometry.stamp_ns) as f64 / NS_PER_S
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::OdometrySample;
+
+    fn sample(t_ms: i64) -> TelemetrySample {
+        TelemetrySample {
+            odometry: OdometrySample { stamp_ns: t_ms * 1_000_000, ..Default::default() },
+            ..Default::default()
+        }
+    }
+
+    #[test]
+    fn windows_overlap_by_length_less_hop() {
+        let mut cutter = WindowCutter::new(WindowConfig { length_s: 1.0, hop_s: 0.4 }).unwrap();
+        let windows: Vec<_> = (0..300).filter_map(|k| cutter.push(sample(10 * k))).collect();
+        let starts: Vec<_> = windows.iter().map(|w| w.start_stamp_ns / 1_000_000).collect();
+        assert_eq!(starts, [0, 400, 800, 1200, 1600]);
+        assert!(windows.iter().all(|w| w.len() == 100));
+    }
+
+    #[test]
+    fn an_infinite_window_is_cut_at_the_end() {
+        let mut cutter =
+            WindowCutter::new(WindowConfig { length_s: f64::INFINITY, hop_s: f64::INFINITY }).unwrap();
+        assert!((0..500).all(|k| cutter.push(sample(10 * k)).is_none()));
+        assert_eq!(cutter.rest().unwrap().len(), 500);
+    }
+
+    #[test]
+    fn lengths_are_checked() {
+        for (length_s, hop_s) in [(0.0, 1.0), (f64::NAN, 1.0), (1.0, 2.0), (1.0, 0.0)] {
+            assert!(WindowCutter::new(WindowConfig { length_s, hop_s }).is_err());
+        }
+    }
+}
