@@ -1,0 +1,17 @@
+//! The suite's own messages, as in `msg/`.
+
+mod common;
+mod friction;
+mod gap;
+mod progress;
+mod residual;
+mod sequence;
+mod tires;
+
+pub use common::{Handshake, Interval, Range};
+pub use friction::FrictionPrior;
+pub use gap::{GapEffect, GapParameter, GapRegion, GapReport};
+pub use progress::IdentificationProgress;
+pub use residual::{Residual, ResidualModel};
+pub use sequence::{Excitation, StateSequence};
+pub use tires::{MagicFormula, PacejkaParams, PeakFriction, SignalCorrections};
