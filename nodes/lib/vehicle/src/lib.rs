@@ -1,1 +1,29 @@
-//! Single-track model, Magic Formula, vehicle parameters, integrators, handling numbers.
+//! The nominal model of the car: what gripsight identifies, and what it compares the real car with.
+//!
+//! * [`MagicFormula`]: normalised lateral force of one axle's tires, F_y/F_z;
+//! * [`SingleTrack`]: the dynamic single-track model of the paper (arXiv 2603.09399, eq. 1-5);
+//! * [`VehicleParameters`]: what is known of the car, read from a ROS 2 parameter file;
+//! * [`handling`]: numbers that an engineer knows: cornering stiffness, understeer gradient, stability.
+//!
+//! The equations are written once, for any [`Real`]: with `f64` they are simulated, with dual numbers they give exact derivatives.
+//!
+//! Signs follow REP-103: left steer, left yaw and left force are positive; a positive slip angle makes a force to the left.
+
+mod error;
+pub mod handling;
+mod magic_formula;
+mod parameters;
+mod single_track;
+
+pub use error::VehicleError;
+pub use magic_formula::{MagicFormula, PacejkaParameters};
+pub use parameters::VehicleParameters;
+pub use single_track::{Input, SingleTrack, State};
+
+/// Standard gravity.
+pub const GRAVITY_MPS2: f64 = 9.806_65;
+
+/// A number that the model can be evaluated with: `f64`, or a dual number carrying derivatives.
+pub trait Real: num_dual::DualNum<Primitive = f64> + Copy {}
+
+impl<T: num_dual::DualNum<Primitive = f64> + Copy> Real for T {}

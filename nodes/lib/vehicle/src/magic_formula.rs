@@ -1,0 +1,152 @@
+//! The Magic Formula with four parameters (Pacejka), normalised by the vertical load.
+//!
+//! F_y/F_z = D sin(C atan(B a - E (B a - atan(B a)))),   a = slip angle in rad
+//!
+//! D is dimensionless: the paper seeds it with the friction prior mu_hat. No load sensitivity, shifts, camber or combined slip.
+
+use serde::{Deserialize, Serialize};
+
+use crate::Real;
+
+/// Parameters of one axle. All dimensionless but `b` (1/rad).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MagicFormula<T = f64> {
+    /// Stiffness factor, 1/rad.
+    pub b: T,
+    /// Shape factor.
+    pub c: T,
+    /// Peak factor: the friction coefficient.
+    pub d: T,
+    /// Curvature factor.
+    pub e: T,
+}
+
+impl<T: Real> MagicFormula<T> {
+    /// F_y/F_z at a slip angle. Odd, and bounded by D.
+    #[must_use]
+    pub fn normalized_force(&self, slip_angle_rad: T) -> T {
+        let ba = self.b * slip_angle_rad;
+        self.d * (self.c * (ba - self.e * (ba - ba.atan())).atan()).sin()
+    }
+
+    /// Slope at zero slip, B C D, 1/rad: times the load it is the cornering stiffness.
+    #[must_use]
+    pub fn normalized_stiffness(&self) -> T {
+        self.b * self.c * self.d
+    }
+}
+
+impl MagicFormula {
+    /// From the stiffness B C D instead of B: with `k` fixed, `d`, `c` and `e` move the shape only, which fits far better
+    /// conditioned than B, C, D, E (a flat ridge).
+    #[must_use]
+    pub fn from_stiffness(normalized_stiffness_1prad: f64, c: f64, d: f64, e: f64) -> Self {
+        Self { b: normalized_stiffness_1prad / (c * d), c, d, e }
+    }
+
+    /// Slip angle of the largest force, searched up to 1.5 rad; `None` where the force still grows there.
+    #[must_use]
+    pub fn peak_slip_rad(&self) -> Option<f64> {
+        const STEP_RAD: f64 = 1e-3;
+        const END_RAD: f64 = 1.5;
+        let mut best = 0.0;
+        let mut at_rad = 0.0;
+        for k in 1..=(END_RAD / STEP_RAD) as usize {
+            let a_rad = k as f64 * STEP_RAD;
+            let f = self.normalized_force(a_rad);
+            if f > best {
+                best = f;
+                at_rad = a_rad;
+            }
+        }
+        (at_rad > 0.0 && at_rad < END_RAD - STEP_RAD / 2.0).then_some(at_rad)
+    }
+
+    /// The largest F_y/F_z up to a slip angle.
+    #[must_use]
+    pub fn max_force_within(&self, slip_angle_rad: f64) -> f64 {
+        match self.peak_slip_rad() {
+            Some(peak_rad) if peak_rad < slip_angle_rad => self.normalized_force(peak_rad),
+            _ => self.normalized_force(slip_angle_rad),
+        }
+    }
+
+    /// Whether all parameters are finite.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        [self.b, self.c, self.d, self.e].iter().all(|v| v.is_finite())
+    }
+}
+
+/// Phi_p of the paper: both axles.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PacejkaParameters<T = f64> {
+    /// Front axle.
+    pub front: MagicFormula<T>,
+    /// Rear axle.
+    pub rear: MagicFormula<T>,
+}
+
+impl PacejkaParameters {
+    /// As (B, C, D, E) front, then rear: the order of every vector of eight.
+    #[must_use]
+    pub fn to_array(&self) -> [f64; 8] {
+        let (f, r) = (&self.front, &self.rear);
+        [f.b, f.c, f.d, f.e, r.b, r.c, r.d, r.e]
+    }
+
+    /// The inverse of [`Self::to_array`].
+    #[must_use]
+    pub fn from_array(v: [f64; 8]) -> Self {
+        Self {
+            front: MagicFormula { b: v[0], c: v[1], d: v[2], e: v[3] },
+            rear: MagicFormula { b: v[4], c: v[5], d: v[6], e: v[7] },
+        }
+    }
+
+    /// Whether all parameters are finite.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.front.is_finite() && self.rear.is_finite()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use num_dual::{DualNum, DualSVec};
+    use proptest::prelude::*;
+
+    fn tires() -> impl Strategy<Value = MagicFormula> {
+        (3.0..30.0, 1.0..2.0, 0.1..1.8, -2.0..0.95).prop_map(|(b, c, d, e)| MagicFormula { b, c, d, e })
+    }
+
+    proptest! {
+        #[test]
+        fn odd_and_bounded(tire in tires(), a in -1.5..1.5) {
+            let f = tire.normalized_force(a);
+            prop_assert!(f.abs() <= tire.d + 1e-12);
+            prop_assert_eq!(f, -tire.normalized_force(-a));
+        }
+
+        #[test]
+        fn slope_at_zero_is_bcd(tire in tires()) {
+            let a: DualSVec<f64, 1> = DualSVec::from_re(0.0).derivative(0);
+            let lift = |v: f64| DualSVec::<f64, 1>::from_re(v);
+            let dual = MagicFormula { b: lift(tire.b), c: lift(tire.c), d: lift(tire.d), e: lift(tire.e) };
+            let slope = dual.normalized_force(a).eps.unwrap_generic(nalgebra::U1, nalgebra::U1)[0];
+            approx::assert_relative_eq!(slope, tire.normalized_stiffness(), max_relative = 1e-12);
+        }
+
+        #[test]
+        fn the_peak_is_the_largest_force(tire in tires(), a in 0.0..1.5) {
+            prop_assert!(tire.normalized_force(a) <= tire.max_force_within(1.5) + 1e-4 * tire.d);
+        }
+
+        #[test]
+        fn stiffness_form_is_the_same_curve(tire in tires()) {
+            let again = MagicFormula::from_stiffness(tire.normalized_stiffness(), tire.c, tire.d, tire.e);
+            approx::assert_relative_eq!(again.b, tire.b, max_relative = 1e-12);
+        }
+    }
+}

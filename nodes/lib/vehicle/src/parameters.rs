@@ -1,0 +1,220 @@
+//! What is known of the car, as a ROS 2 parameter file.
+//!
+//! ```yaml
+//! /**:
+//!   ros__parameters:
+//!     vehicle:
+//!       name: car        # optional: names the output files
+//!       mass_kg: 3.3
+//!       yaw_inertia_kgm2: 0.045
+//!       l_f_m: 0.15      # centre of gravity to front axle
+//!       l_r_m: 0.17      # centre of gravity to rear axle
+//!       h_cg_m: 0.06
+//! ```
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::VehicleError;
+
+/// Parameters of the single-track model, and what the outputs for other stacks need.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VehicleParameters {
+    /// Names the output files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Mass with driver or computer.
+    pub mass_kg: f64,
+    /// Inertia about the vertical axis through the centre of gravity.
+    pub yaw_inertia_kgm2: f64,
+    /// Centre of gravity to front axle.
+    pub l_f_m: f64,
+    /// Centre of gravity to rear axle.
+    pub l_r_m: f64,
+    /// Height of the centre of gravity.
+    pub h_cg_m: f64,
+    /// Share of the drive force at the front axle: 0 rear drive, 1 front drive.
+    #[serde(default)]
+    pub drive_front_share: f64,
+    /// Share of the brake force at the front axle.
+    #[serde(default = "default_brake_front_share")]
+    pub brake_front_share: f64,
+    /// Largest road-wheel angle.
+    #[serde(default = "default_max_steering_rad")]
+    pub max_steering_rad: f64,
+    /// Radius of the driven wheels, where known: turns wheel effort into force.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wheel_radius_m: Option<f64>,
+}
+
+/// Brake balance of a car whose own is not known.
+fn default_brake_front_share() -> f64 {
+    0.6
+}
+
+/// A common lock of 1:10 cars; full-size cars have more and use less.
+fn default_max_steering_rad() -> f64 {
+    0.45
+}
+
+#[derive(Deserialize)]
+struct Node {
+    ros__parameters: BTreeMap<String, serde::de::IgnoredAny>,
+}
+
+#[derive(Deserialize)]
+struct VehicleNode {
+    ros__parameters: VehicleBlock,
+}
+
+#[derive(Deserialize)]
+struct VehicleBlock {
+    vehicle: VehicleParameters,
+}
+
+impl VehicleParameters {
+    /// Reads a ROS 2 parameter file: the `vehicle` block of the first node that has one.
+    ///
+    /// # Errors
+    /// [`VehicleError`] names what cannot be read, is missing, unknown or out of range.
+    pub fn from_ros_yaml(text: &str) -> Result<Self, VehicleError> {
+        let yaml = |e: serde_saphyr::Error| VehicleError::Yaml(e.to_string());
+        let nodes: BTreeMap<String, Node> = serde_saphyr::from_str(text).map_err(yaml)?;
+        let Some(node) = nodes.iter().find(|(_, n)| n.ros__parameters.contains_key("vehicle")) else {
+            let found =
+                nodes.values().flat_map(|n| n.ros__parameters.keys().cloned()).collect::<Vec<_>>().join(", ");
+            return Err(VehicleError::NoVehicle {
+                found: if found.is_empty() { "nothing".into() } else { found },
+            });
+        };
+        // Other nodes and other blocks of the file may hold anything.
+        #[derive(Deserialize)]
+        #[serde(untagged)]
+        enum Any {
+            Vehicle(VehicleNode),
+            Other(serde::de::IgnoredAny),
+        }
+        let mut all: BTreeMap<String, Any> = serde_saphyr::from_str(text).map_err(yaml)?;
+        match all.remove(node.0) {
+            Some(Any::Vehicle(v)) => v.ros__parameters.vehicle.checked(),
+            _ => {
+                // An untagged enum hides why: read again for the message.
+                let strict: Result<BTreeMap<String, VehicleNode>, _> = serde_saphyr::from_str(text);
+                Err(strict
+                    .err()
+                    .map_or_else(|| VehicleError::Yaml("unreadable `vehicle` block".into()), yaml))
+            }
+        }
+    }
+
+    /// Gives the parameters back where all are in range.
+    ///
+    /// # Errors
+    /// [`VehicleError::Parameter`] names the first that is not.
+    pub fn checked(self) -> Result<Self, VehicleError> {
+        let positive = [
+            ("mass_kg", self.mass_kg),
+            ("yaw_inertia_kgm2", self.yaw_inertia_kgm2),
+            ("l_f_m", self.l_f_m),
+            ("l_r_m", self.l_r_m),
+            ("max_steering_rad", self.max_steering_rad),
+            ("wheel_radius_m", self.wheel_radius_m.unwrap_or(1.0)),
+        ];
+        if let Some(&(name, got)) = positive.iter().find(|(_, v)| !(v.is_finite() && *v > 0.0)) {
+            return Err(VehicleError::Parameter { name, got, must: "positive and finite" });
+        }
+        if !(self.h_cg_m.is_finite() && self.h_cg_m >= 0.0) {
+            return Err(VehicleError::Parameter {
+                name: "h_cg_m",
+                got: self.h_cg_m,
+                must: "at least 0 and finite",
+            });
+        }
+        let shares =
+            [("drive_front_share", self.drive_front_share), ("brake_front_share", self.brake_front_share)];
+        if let Some(&(name, got)) = shares.iter().find(|(_, v)| !(0.0..=1.0).contains(v)) {
+            return Err(VehicleError::Parameter { name, got, must: "between 0 and 1" });
+        }
+        Ok(self)
+    }
+
+    /// Distance between the axles.
+    #[must_use]
+    pub fn wheelbase_m(&self) -> f64 {
+        self.l_f_m + self.l_r_m
+    }
+
+    /// A number that changes with any parameter: results carry it, so that they are not used with another car.
+    #[must_use]
+    pub fn hash(&self) -> u64 {
+        let numbers = [
+            self.mass_kg,
+            self.yaw_inertia_kgm2,
+            self.l_f_m,
+            self.l_r_m,
+            self.h_cg_m,
+            self.drive_front_share,
+            self.brake_front_share,
+            self.max_steering_rad,
+            self.wheel_radius_m.unwrap_or(0.0),
+        ];
+        // FNV-1a over the bits: stable across builds, and nothing here needs to resist an attacker.
+        numbers
+            .iter()
+            .flat_map(|v| v.to_bits().to_le_bytes())
+            .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    }
+
+    /// Values of an F1TENTH-class 1:10 car, the default where no file is given.
+    #[must_use]
+    pub fn f1tenth() -> Self {
+        Self {
+            name: None,
+            mass_kg: 3.54,
+            yaw_inertia_kgm2: 0.05,
+            l_f_m: 0.162,
+            l_r_m: 0.145,
+            h_cg_m: 0.06,
+            drive_front_share: 0.0,
+            brake_front_share: default_brake_front_share(),
+            max_steering_rad: default_max_steering_rad(),
+            wheel_radius_m: None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOOD: &str = "/**:\n  ros__parameters:\n    vehicle:\n      mass_kg: 3.3\n      yaw_inertia_kgm2: 0.045\n      l_f_m: 0.15\n      l_r_m: 0.17\n      h_cg_m: 0.06\n";
+
+    #[test]
+    fn a_ros_parameter_file_is_read() {
+        let other =
+            format!("/planner:\n  ros__parameters:\n    rate: 3\n    list: [1, 2]\n{GOOD}    rate: 50.0\n");
+        for text in [GOOD, &other] {
+            let car = VehicleParameters::from_ros_yaml(text).unwrap();
+            assert_eq!((car.mass_kg, car.l_r_m), (3.3, 0.17));
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        let error = |text: &str| VehicleParameters::from_ros_yaml(text).unwrap_err().to_string();
+        assert!(error(&GOOD.replace("3.3", "-3.3")).contains("mass_kg is -3.3"));
+        assert!(error(&GOOD.replace("      l_f_m: 0.15\n", "")).contains("l_f_m"));
+        assert!(error(&GOOD.replace("mass_kg", "mass_lb")).contains("mass_lb"));
+        assert!(error("/**:\n  ros__parameters:\n    car: 1\n").contains("car"));
+        assert!(error("][").starts_with("vehicle file"));
+    }
+
+    #[test]
+    fn the_hash_sees_every_parameter() {
+        let car = VehicleParameters::f1tenth();
+        let heavier = VehicleParameters { mass_kg: car.mass_kg + 1e-9, ..car.clone() };
+        assert_ne!(car.hash(), heavier.hash());
+    }
+}
