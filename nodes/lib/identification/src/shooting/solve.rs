@@ -1,0 +1,179 @@
+//! Levenberg-Marquardt within bounds.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::linearize::{cost, linearize};
+use super::{Linearization, Problem, Rollout};
+
+/// Why a fit ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StopReason {
+    /// The last step changed the cost by less than the tolerance.
+    Converged,
+    /// No step lowers the cost any more.
+    NoDescent,
+    /// The iterations were used up.
+    MaxIterations,
+    /// The start itself gives no finite cost.
+    NotFinite,
+}
+
+/// Result of a fit.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// All parameters of the model.
+    pub parameters: Vec<f64>,
+    /// Start state of every window.
+    pub starts: Vec<[f64; 2]>,
+    /// The problem around the solution.
+    pub linearization: Linearization,
+    /// Free parameters that ended on a bound.
+    pub on_bound: Vec<usize>,
+    /// Why it ended.
+    pub stop: StopReason,
+    /// Steps taken.
+    pub iterations: usize,
+    free: Vec<usize>,
+}
+
+impl Fit {
+    /// Covariance of the free parameters, in their order, robust to errors that are correlated within a window (sandwich with the windows
+    /// as clusters): H^-1 (sum_w g_w g_w^T) H^-1. Parameters on a bound count as known. `None` where the information is singular.
+    #[must_use]
+    pub fn covariance(&self) -> Option<DMatrix<f64>> {
+        let p = self.free.len();
+        let pinned: Vec<bool> = self.free.iter().map(|j| self.on_bound.contains(j)).collect();
+        let mut information = self.linearization.information.clone();
+        pin(&mut information, None, &pinned);
+        let inverse = information.cholesky()?.inverse();
+        let mut meat = DMatrix::zeros(p, p);
+        for g in &self.linearization.window_gradients {
+            let mut g = g.clone();
+            (0..p).filter(|&a| pinned[a]).for_each(|a| g[a] = 0.0);
+            meat += &g * g.transpose();
+        }
+        let windows = self.linearization.window_gradients.len() as f64;
+        let small_sample = windows / (windows - p as f64).max(1.0);
+        Some(&inverse * meat * &inverse * small_sample)
+    }
+
+    /// Standard error of parameter `j` of the model; `None` if it was not free or nothing is known of it.
+    #[must_use]
+    pub fn standard_error(&self, j: usize) -> Option<f64> {
+        let place = self.free.iter().position(|&f| f == j)?;
+        self.covariance().map(|c| c[(place, place)].max(0.0).sqrt())
+    }
+}
+
+/// Relative change of the cost under which a fit has converged.
+const TOLERANCE: f64 = 1e-6;
+
+/// Fits the free parameters of a problem, from its start values and the given start states (else the model's guesses).
+#[must_use]
+pub fn fit<M: Rollout>(problem: &Problem<'_, M>, starts: Option<Vec<[f64; 2]>>) -> Fit {
+    let free = problem.free();
+    let mut parameters: Vec<f64> = problem.parameters.iter().map(|p| p.start.clamp(p.low, p.high)).collect();
+    let mut starts =
+        starts.unwrap_or_else(|| problem.windows.iter().map(|w| problem.model.start_guess(w)).collect());
+    let mut here = linearize(problem, &parameters, &starts);
+    let mut damping = 1e-3;
+    let mut stop = StopReason::MaxIterations;
+    let mut iterations = 0;
+    if !here.cost.is_finite() {
+        stop = StopReason::NotFinite;
+    }
+    while stop == StopReason::MaxIterations && iterations < problem.max_iterations {
+        iterations += 1;
+        let Some((trial, trial_starts, trial_cost)) =
+            descend(problem, &free, &parameters, &starts, &here, &mut damping)
+        else {
+            stop = StopReason::NoDescent;
+            break;
+        };
+        let change = (here.cost - trial_cost) / here.cost.max(f64::MIN_POSITIVE);
+        parameters = trial;
+        starts = trial_starts;
+        here = linearize(problem, &parameters, &starts);
+        if change < TOLERANCE {
+            stop = StopReason::Converged;
+        }
+    }
+    let on_bound = free
+        .iter()
+        .copied()
+        .filter(|&j| {
+            let p = &problem.parameters[j];
+            let margin = 1e-6 * (p.high - p.low);
+            parameters[j] <= p.low + margin || parameters[j] >= p.high - margin
+        })
+        .collect();
+    Fit { parameters, starts, linearization: here, on_bound, stop, iterations, free }
+}
+
+type Trial = (Vec<f64>, Vec<[f64; 2]>, f64);
+
+/// Finds a step that lowers the cost, raising the damping until one does.
+fn descend<M: Rollout>(
+    problem: &Problem<'_, M>,
+    free: &[usize],
+    parameters: &[f64],
+    starts: &[[f64; 2]],
+    here: &Linearization,
+    damping: &mut f64,
+) -> Option<Trial> {
+    // A parameter on its bound that would go further out does not take part.
+    let pinned: Vec<bool> = free
+        .iter()
+        .enumerate()
+        .map(|(row, &j)| {
+            let (p, v, g) = (&problem.parameters[j], parameters[j], here.gradient[row]);
+            (v <= p.low && g > 0.0) || (v >= p.high && g < 0.0)
+        })
+        .collect();
+    for _ in 0..12 {
+        let mut information = here.information.clone();
+        let mut gradient = here.gradient.clone();
+        for a in 0..free.len() {
+            information[(a, a)] += *damping * information[(a, a)].max(1e-12);
+        }
+        pin(&mut information, Some(&mut gradient), &pinned);
+        if let Some(cholesky) = information.cholesky() {
+            let step = -cholesky.solve(&gradient);
+            let mut trial = parameters.to_vec();
+            for (row, &j) in free.iter().enumerate() {
+                let p = &problem.parameters[j];
+                trial[j] = (trial[j] + step[row]).clamp(p.low, p.high);
+            }
+            let taken = DVector::from_iterator(free.len(), free.iter().map(|&j| trial[j] - parameters[j]));
+            let trial_starts: Vec<[f64; 2]> = starts
+                .iter()
+                .zip(&here.eliminations)
+                .map(|(x, e)| {
+                    let dx = &e.offset + &e.slope * &taken;
+                    [x[0] - dx[0], x[1] - dx[1]]
+                })
+                .collect();
+            let trial_cost = cost(problem, &trial, &trial_starts);
+            if trial_cost < here.cost {
+                *damping = (*damping * 0.2).max(1e-9);
+                return Some((trial, trial_starts, trial_cost));
+            }
+        }
+        *damping = (*damping * 5.0).max(1e-6);
+    }
+    None
+}
+
+/// Takes rows and columns out of a system without changing its size.
+fn pin(information: &mut DMatrix<f64>, gradient: Option<&mut DVector<f64>>, pinned: &[bool]) {
+    for a in (0..pinned.len()).filter(|&a| pinned[a]) {
+        information.row_mut(a).fill(0.0);
+        information.column_mut(a).fill(0.0);
+        information[(a, a)] = 1.0;
+    }
+    if let Some(gradient) = gradient {
+        for a in (0..pinned.len()).filter(|&a| pinned[a]) {
+            gradient[a] = 0.0;
+        }
+    }
+}
