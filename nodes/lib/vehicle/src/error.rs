@@ -18,9 +18,9 @@ pub enum VehicleError {
     #[error("vehicle file: {0}")]
     Yaml(String),
     /// The parameter file has no `vehicle` block.
-    #[error("vehicle file: no `vehicle` block under any node's ros__parameters (found: {found})")]
+    #[error("vehicle file: no `vehicle` block under any node's ros__parameters (nodes: {found})")]
     NoVehicle {
-        /// The names that are there.
+        /// The nodes that are there.
         found: String,
     },
 }

@@ -114,7 +114,7 @@ impl PacejkaParameters {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use num_dual::{DualNum, DualSVec};
+    use num_dual::DualSVec;
     use proptest::prelude::*;
 
     fn tires() -> impl Strategy<Value = MagicFormula> {

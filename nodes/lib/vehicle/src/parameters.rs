@@ -59,54 +59,29 @@ fn default_max_steering_rad() -> f64 {
     0.45
 }
 
+// Other nodes and other blocks of the file may hold anything: unknown keys are passed over down to `vehicle`, none in it.
 #[derive(Deserialize)]
 struct Node {
-    ros__parameters: BTreeMap<String, serde::de::IgnoredAny>,
+    #[serde(rename = "ros__parameters")]
+    parameters: Option<Parameters>,
 }
 
 #[derive(Deserialize)]
-struct VehicleNode {
-    ros__parameters: VehicleBlock,
-}
-
-#[derive(Deserialize)]
-struct VehicleBlock {
-    vehicle: VehicleParameters,
+struct Parameters {
+    vehicle: Option<VehicleParameters>,
 }
 
 impl VehicleParameters {
-    /// Reads a ROS 2 parameter file: the `vehicle` block of the first node that has one.
+    /// Reads a ROS 2 parameter file: the `vehicle` block of the first node (by name) that has one.
     ///
     /// # Errors
     /// [`VehicleError`] names what cannot be read, is missing, unknown or out of range.
     pub fn from_ros_yaml(text: &str) -> Result<Self, VehicleError> {
-        let yaml = |e: serde_saphyr::Error| VehicleError::Yaml(e.to_string());
-        let nodes: BTreeMap<String, Node> = serde_saphyr::from_str(text).map_err(yaml)?;
-        let Some(node) = nodes.iter().find(|(_, n)| n.ros__parameters.contains_key("vehicle")) else {
-            let found =
-                nodes.values().flat_map(|n| n.ros__parameters.keys().cloned()).collect::<Vec<_>>().join(", ");
-            return Err(VehicleError::NoVehicle {
-                found: if found.is_empty() { "nothing".into() } else { found },
-            });
-        };
-        // Other nodes and other blocks of the file may hold anything.
-        #[derive(Deserialize)]
-        #[serde(untagged)]
-        enum Any {
-            Vehicle(VehicleNode),
-            Other(serde::de::IgnoredAny),
-        }
-        let mut all: BTreeMap<String, Any> = serde_saphyr::from_str(text).map_err(yaml)?;
-        match all.remove(node.0) {
-            Some(Any::Vehicle(v)) => v.ros__parameters.vehicle.checked(),
-            _ => {
-                // An untagged enum hides why: read again for the message.
-                let strict: Result<BTreeMap<String, VehicleNode>, _> = serde_saphyr::from_str(text);
-                Err(strict
-                    .err()
-                    .map_or_else(|| VehicleError::Yaml("unreadable `vehicle` block".into()), yaml))
-            }
-        }
+        let nodes: BTreeMap<String, Node> =
+            serde_saphyr::from_str(text).map_err(|e| VehicleError::Yaml(e.to_string()))?;
+        let found = nodes.keys().cloned().collect::<Vec<_>>().join(", ");
+        let vehicle = nodes.into_values().find_map(|node| node.parameters?.vehicle);
+        vehicle.ok_or(VehicleError::NoVehicle { found })?.checked()
     }
 
     /// Gives the parameters back where all are in range.
@@ -207,7 +182,7 @@ mod tests {
         assert!(error(&GOOD.replace("3.3", "-3.3")).contains("mass_kg is -3.3"));
         assert!(error(&GOOD.replace("      l_f_m: 0.15\n", "")).contains("l_f_m"));
         assert!(error(&GOOD.replace("mass_kg", "mass_lb")).contains("mass_lb"));
-        assert!(error("/**:\n  ros__parameters:\n    car: 1\n").contains("car"));
+        assert!(error("/car:\n  ros__parameters:\n    mass: 1\n").contains("/car"));
         assert!(error("][").starts_with("vehicle file"));
     }
 

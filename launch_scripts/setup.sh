@@ -1,0 +1,101 @@
+#!/usr/bin/env bash
+# Installs what gripsight needs on a Debian or Ubuntu machine that has a Rust toolchain. Safe to run again.
+set -euo pipefail
+
+usage() {
+    cat <<'TEXT'
+Usage: launch_scripts/setup.sh [--tests] [--dry-run]
+
+Sets up, inside the project's folder as far as possible:
+  system packages   launch_scripts/apt_packages.txt; without root they are unpacked into .deps/system
+  ONNX Runtime      .deps/onnxruntime, from a pinned and hash-checked wheel (for the camera prior)
+  Python tools      .venv, tests/requirements.txt (DDS peers and bag readers; only with --tests)
+
+  --tests     also what the tests need
+  --dry-run   say what would be done, do nothing
+
+Examples:
+  launch_scripts/setup.sh              to run gripsight
+  launch_scripts/setup.sh --tests      to run its tests too
+TEXT
+}
+
+cd "$(dirname "$0")/.."
+with_tests=false
+dry_run=false
+for argument in "$@"; do
+    case $argument in
+        --tests) with_tests=true ;;
+        --dry-run) dry_run=true ;;
+        -h | --help) usage; exit 0 ;;
+        *) echo "setup: unknown option '$argument'" >&2; usage >&2; exit 2 ;;
+    esac
+done
+
+say() { printf 'setup: %s\n' "$*" >&2; }
+run() { if $dry_run; then say "would run: $*"; else "$@"; fi; }
+
+command -v cargo >/dev/null || { say "no Rust toolchain: install cargo with rustup, then run this again"; exit 1; }
+
+# --- system packages -------------------------------------------------------------------------------------------------
+# A line of the list: package name, then `tests` where only the tests need it.
+wanted=()
+while read -r name purpose _; do
+    if [[ -z $name || $name == \#* ]]; then continue; fi
+    if [[ $purpose != tests ]] || $with_tests; then wanted+=("$name"); fi
+done < launch_scripts/apt_packages.txt
+
+installed() { [[ $(dpkg-query -W -f '${db:Status-Status}' "$1" 2>/dev/null) == installed ]]; }
+missing=()
+for package in "${wanted[@]}"; do installed "$package" || missing+=("$package"); done
+
+unpack_without_root() {
+    # What apt would install, dependencies included, unpacked where nothing else is touched.
+    local all
+    all=$(apt-get install --simulate -qq "${missing[@]}" | awk '/^Inst/ {print $2}')
+    say "no root: unpacking into .deps/system: $(tr '\n' ' ' <<<"$all")"
+    if $dry_run; then return; fi
+    mkdir -p .deps/debs .deps/system
+    # shellcheck disable=SC2086
+    (cd .deps/debs && apt-get download -qq $all)
+    for package in .deps/debs/*.deb; do dpkg -x "$package" .deps/system; done
+    printf '%s\n' "${missing[@]}" > .deps/system/unpacked.txt
+}
+
+if ((${#missing[@]} == 0)); then
+    say "system packages: all there"
+elif ! command -v apt-get >/dev/null; then
+    say "not a Debian or Ubuntu machine: install these yourself: ${missing[*]}"
+elif ((EUID == 0)) || sudo -n true 2>/dev/null; then
+    sudo=(); if ((EUID != 0)); then sudo=(sudo -n); fi
+    say "installing system packages: ${missing[*]}"
+    run "${sudo[@]}" apt-get update -qq
+    run "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >&2
+elif [[ -f .deps/system/unpacked.txt ]] && diff -q <(printf '%s\n' "${missing[@]}") .deps/system/unpacked.txt >/dev/null; then
+    say "system packages: unpacked in .deps/system"
+else
+    unpack_without_root
+fi
+
+# --- Python tools ----------------------------------------------------------------------------------------------------
+python=${PYTHON:-python3}
+make_venv() {
+    if [[ -x .venv/bin/python ]]; then return; fi
+    "$python" -m venv .venv || { say "'$python -m venv' failed: is python3-venv installed?"; exit 1; }
+}
+if $with_tests; then
+    if $dry_run; then
+        say "would make .venv and install tests/requirements.txt"
+    elif [[ -f .venv/requirements.txt ]] && diff -q tests/requirements.txt .venv/requirements.txt >/dev/null; then
+        say "Python tools: all there"
+    else
+        say "installing Python tools into .venv"
+        make_venv
+        .venv/bin/python -m pip install -q --disable-pip-version-check -r tests/requirements.txt >&2
+        cp tests/requirements.txt .venv/requirements.txt
+    fi
+fi
+
+# --- ONNX Runtime ----------------------------------------------------------------------------------------------------
+run launch_scripts/fetch_onnxruntime.sh
+say "done"
