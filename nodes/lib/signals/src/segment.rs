@@ -118,7 +118,6 @@ fn segment(sequence: &StateSequence, from: usize, to: usize, dt_s: f64) -> Segme
             })
             .collect()
     };
-    let yaw_rad = unwrap_angle(&sequence.yaw_rad);
     Segment {
         start_time_s,
         dt_s,
@@ -128,30 +127,13 @@ fn segment(sequence: &StateSequence, from: usize, to: usize, dt_s: f64) -> Segme
         steering_rad: even(&sequence.steering_rad),
         x_m: even(&sequence.x_m),
         y_m: even(&sequence.y_m),
-        yaw_rad: even(&yaw_rad),
+        yaw_rad: even(&sequence.yaw_rad),
         a_x_mps2: even(&sequence.a_x_mps2),
         a_y_mps2: even(&sequence.a_y_mps2),
         gyro_yaw_rate_radps: even(&sequence.gyro_yaw_rate_radps),
         command_acceleration_mps2: even(&sequence.command_acceleration_mps2),
         wheel_speed: std::array::from_fn(|w| even(&sequence.wheel_speed[w])),
     }
-}
-
-fn unwrap_angle(wrapped_rad: &[f32]) -> Vec<f32> {
-    let mut turns = 0.0;
-    let mut previous = None;
-    wrapped_rad
-        .iter()
-        .map(|&a| {
-            let a = f64::from(a);
-            if let Some(p) = previous {
-                let jump: f64 = a - p;
-                turns -= (jump / std::f64::consts::TAU).round();
-            }
-            previous = Some(a);
-            (a + turns * std::f64::consts::TAU) as f32
-        })
-        .collect()
 }
 
 #[cfg(test)]
@@ -166,13 +148,6 @@ mod tests {
             v_y_mps: zeros.clone(),
             yaw_rate_radps: zeros.clone(),
             steering_rad: zeros,
-            yaw_rad: times_s
-                .iter()
-                .map(|t| {
-                    let a = 3.0 * t;
-                    (a as f64).sin().atan2((a as f64).cos()) as f32
-                })
-                .collect(),
             ..Default::default()
         }
     }
@@ -187,11 +162,6 @@ mod tests {
         for part in &parts {
             for k in 0..part.len() {
                 approx::assert_abs_diff_eq!(part.v_x_mps[k], 2.0 * part.time_s(k), epsilon = 1e-5);
-                approx::assert_abs_diff_eq!(
-                    part.yaw_rad[k] - part.yaw_rad[0],
-                    3.0 * k as f64 * part.dt_s,
-                    epsilon = 1e-4
-                );
             }
         }
         assert!(segments(&ramp(&times), 1.5).unwrap().is_empty());

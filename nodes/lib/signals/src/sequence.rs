@@ -26,7 +26,7 @@ pub struct StateSequence {
     pub x_m: Vec<f32>,
     /// Position relative to the first sample; empty without a pose.
     pub y_m: Vec<f32>,
-    /// Heading; empty without a pose.
+    /// Heading, unwrapped; empty without a pose.
     pub yaw_rad: Vec<f32>,
     /// Specific force forward; empty without an inertial unit.
     pub a_x_mps2: Vec<f32>,
@@ -40,8 +40,8 @@ pub struct StateSequence {
     pub command_acceleration_mps2: Vec<f32>,
     /// Wheel speeds as reported, order of [`crate::WHEELS`]; empty without them.
     pub wheel_speed: [Vec<f32>; 4],
-    /// Wheel torques, order of [`crate::WHEELS`]; empty without them.
-    pub wheel_effort_nm: [Vec<f32>; 4],
+    /// Torque on both wheels of the front and of the rear axle together; empty without them.
+    pub wheel_effort_nm: [Vec<f32>; 2],
 }
 
 impl StateSequence {
@@ -75,16 +75,15 @@ impl StateSequence {
             steering_rad: channel(&|s| s.drive.steering_angle_rad),
             x_m: pose(&|s| s.odometry.x_m - origin.x_m),
             y_m: pose(&|s| s.odometry.y_m - origin.y_m),
-            yaw_rad: pose(&|s| s.odometry.yaw_rad),
+            yaw_rad: unwrapped(pose(&|s| s.odometry.yaw_rad)),
             a_x_mps2: optional(&|s| s.imu.map(|i| i.a_x_mps2)),
             a_y_mps2: optional(&|s| s.imu.map(|i| i.a_y_mps2)),
             gyro_yaw_rate_radps: optional(&|s| s.imu.map(|i| i.yaw_rate_radps)),
             command_speed_mps: unless_zero(channel(&|s| s.drive.speed_mps)),
             command_acceleration_mps2: unless_zero(channel(&|s| s.drive.acceleration_mps2)),
             wheel_speed: std::array::from_fn(|w| optional(&|s| s.wheels.map(|x| x.speed[w]))),
-            wheel_effort_nm: std::array::from_fn(|w| {
-                optional(&|s| s.wheels.and_then(|x| x.effort_nm).map(|e| e[w]))
-            }),
+            wheel_effort_nm: [0, 2]
+                .map(|left| optional(&|s| s.wheels.and_then(|x| x.effort_nm).map(|e| e[left] + e[left + 1]))),
         })
     }
 
@@ -110,8 +109,7 @@ impl StateSequence {
     #[must_use]
     pub fn channels(&self) -> Vec<(&'static str, &[f32])> {
         const SPEED: [&str; 4] = ["wheel_speed_fl", "wheel_speed_fr", "wheel_speed_rl", "wheel_speed_rr"];
-        const EFFORT: [&str; 4] =
-            ["wheel_effort_fl_nm", "wheel_effort_fr_nm", "wheel_effort_rl_nm", "wheel_effort_rr_nm"];
+        const EFFORT: [&str; 2] = ["wheel_effort_front_nm", "wheel_effort_rear_nm"];
         let mut all: Vec<(&'static str, &[f32])> = vec![
             ("time_s", &self.time_s),
             ("v_x_mps", &self.v_x_mps),
@@ -165,5 +163,60 @@ impl StateSequence {
             }),
             None => Ok(()),
         }
+    }
+}
+
+/// Angles without the jumps of a full turn.
+fn unwrapped(mut angles_rad: Vec<f32>) -> Vec<f32> {
+    for k in 1..angles_rad.len() {
+        let turns = ((angles_rad[k] - angles_rad[k - 1]) / std::f32::consts::TAU).round();
+        angles_rad[k] -= turns * std::f32::consts::TAU;
+    }
+    angles_rad
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ImuSample, OdometrySample, WheelsSample};
+
+    fn samples() -> Vec<TelemetrySample> {
+        (0..200)
+            .map(|k| {
+                let yaw_rad = 0.1 * f64::from(k);
+                TelemetrySample {
+                    odometry: OdometrySample {
+                        stamp_ns: 5_000_000_000 + i64::from(k) * 10_000_000,
+                        x_m: 7.0 + f64::from(k),
+                        yaw_rad: yaw_rad.sin().atan2(yaw_rad.cos()),
+                        v_x_mps: 3.0,
+                        ..Default::default()
+                    },
+                    wheels: Some(WheelsSample {
+                        effort_nm: Some([1.0, 2.0, 3.0, 4.0]),
+                        ..Default::default()
+                    }),
+                    ..Default::default()
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn times_and_positions_are_relative_and_the_heading_has_no_jumps() {
+        let sequence = StateSequence::from_samples(&samples()).unwrap();
+        sequence.check().unwrap();
+        assert_eq!(sequence.sequence_id, 5_000_000_000);
+        assert_eq!((sequence.time_s[100], sequence.x_m[100]), (1.0, 100.0));
+        approx::assert_abs_diff_eq!(sequence.yaw_rad[199], 19.9, epsilon = 1e-4);
+        assert_eq!((sequence.wheel_effort_nm[0][0], sequence.wheel_effort_nm[1][0]), (3.0, 7.0));
+    }
+
+    #[test]
+    fn a_channel_that_is_not_recorded_throughout_is_left_out() {
+        let mut partly = samples();
+        partly[3].imu = Some(ImuSample::default());
+        let sequence = StateSequence::from_samples(&partly).unwrap();
+        assert!(sequence.a_y_mps2.is_empty() && sequence.command_acceleration_mps2.is_empty());
     }
 }
