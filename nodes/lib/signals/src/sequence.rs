@@ -45,7 +45,8 @@ pub struct StateSequence {
 }
 
 impl StateSequence {
-    /// Makes a sequence of aligned samples. An optional channel is kept where every sample has it; a commanded acceleration where
+    /// Makes a sequence of aligned samples. An optional channel is kept where nearly every sample has it (a topic may start a
+    /// moment late; the value next to it then stands in); a commanded acceleration where
     /// it is not zero throughout; a pose where it is not zero throughout.
     ///
     /// # Errors
@@ -58,7 +59,7 @@ impl StateSequence {
         let channel =
             |f: &dyn Fn(&TelemetrySample) -> f64| samples.iter().map(|s| f(s) as f32).collect::<Vec<_>>();
         let optional = |f: &dyn Fn(&TelemetrySample) -> Option<f64>| {
-            samples.iter().map(|s| f(s).map(|v| v as f32)).collect::<Option<Vec<_>>>().unwrap_or_default()
+            filled(samples.iter().map(|s| f(s).map(|v| v as f32)).collect())
         };
         let unless_zero = |v: Vec<f32>| if v.iter().all(|&x| x == 0.0) { Vec::new() } else { v };
         let posed = samples.iter().any(|s| {
@@ -166,6 +167,25 @@ impl StateSequence {
     }
 }
 
+/// Share of the samples that must hold an optional channel for it to be kept.
+const MIN_RECORDED_SHARE: f64 = 0.95;
+
+/// A channel with its few missing values taken from their neighbours; empty where too many are missing.
+fn filled(values: Vec<Option<f32>>) -> Vec<f32> {
+    let recorded = values.iter().flatten().count();
+    let Some(mut last) = values.iter().copied().flatten().next() else { return Vec::new() };
+    if (recorded as f64) < MIN_RECORDED_SHARE * values.len() as f64 {
+        return Vec::new();
+    }
+    values
+        .into_iter()
+        .map(|v| {
+            last = v.unwrap_or(last);
+            last
+        })
+        .collect()
+}
+
 /// Angles without the jumps of a full turn.
 fn unwrapped(mut angles_rad: Vec<f32>) -> Vec<f32> {
     for k in 1..angles_rad.len() {
@@ -213,7 +233,14 @@ mod tests {
     }
 
     #[test]
-    fn a_channel_that_is_not_recorded_throughout_is_left_out() {
+    fn a_channel_is_kept_where_nearly_every_sample_has_it() {
+        let mut late = samples();
+        for (k, sample) in late.iter_mut().enumerate().skip(4) {
+            sample.imu = Some(ImuSample { a_y_mps2: k as f64, ..Default::default() });
+        }
+        let a_y_mps2 = StateSequence::from_samples(&late).unwrap().a_y_mps2;
+        assert_eq!((a_y_mps2.len(), a_y_mps2[0], a_y_mps2[5]), (200, 4.0, 5.0));
+
         let mut partly = samples();
         partly[3].imu = Some(ImuSample::default());
         let sequence = StateSequence::from_samples(&partly).unwrap();
