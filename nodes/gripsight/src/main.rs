@@ -1,3 +1,58 @@
-//! The command line: identify, diagnose, friction, simulate, withheld, bag.
+//! gripsight: what the nodes do on the car, offline on bags and without ROS.
+//!
+//! Standard output holds results, standard error progress and logs. Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but the
+//! result is not accepted (or not identifiable).
 
-fn main() {}
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use tracing_subscriber::EnvFilter;
+
+/// Identify a race car's tires from its telemetry, and explain where its model and the real car disagree.
+#[derive(Debug, Parser)]
+#[command(version, max_term_width = 110, after_help = EXIT_CODES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXIT_CODES: &str = "\
+Exit codes: 0 done; 1 failed; 2 wrong usage; 3 done, but the result is not accepted or not identifiable.
+Results go to standard output, progress and logs to standard error; RUST_LOG=debug shows more.";
+
+#[derive(Debug, Subcommand)]
+enum Command {}
+
+/// How a subcommand ended that did not fail.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Outcome {
+    /// Exit code 0.
+    Done,
+    /// Exit code 3: done, but the result is not accepted or not identifiable.
+    NotAccepted,
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .without_time()
+        .with_target(false)
+        .init();
+    match run(cli.command) {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::NotAccepted) => ExitCode::from(3),
+        Err(error) => {
+            // One line for what failed, one for each cause.
+            eprintln!("error: {error}");
+            error.chain().skip(1).for_each(|cause| eprintln!("  because: {cause}"));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(command: Command) -> anyhow::Result<Outcome> {
+    match command {}
+}
