@@ -1,1 +1,29 @@
-//! MCAP bags and ROS 2 messages to telemetry: the one conversion, used live and offline.
+//! MCAP bags and ROS 2 messages to telemetry and back: the one conversion, used live (from message structs) and offline (from the
+//! CDR bytes of a bag).
+//!
+//! - [`read_sequences`] and [`read_measurements`]: a bag's telemetry, topics found by type or by a [`TopicMap`].
+//! - [`Bag`]: its topics and its messages as bytes.
+//! - [`decode`], [`encode`]: messages and samples; [`sequence_to_messages`], [`Reassembler`]: sequences in chunks.
+//! - [`from_cdr`], [`to_cdr`]: messages and bytes.
+//!
+//! A bag is an `.mcap` file or a rosbag2 folder; its memory is bounded by one chunk, and no length in it is trusted.
+
+mod bag;
+mod cdr;
+pub mod decode;
+pub mod encode;
+mod error;
+mod records;
+mod rosbag2;
+mod sequence;
+mod telemetry;
+mod topics;
+
+pub use bag::{Bag, Messages, RawMessage, Topic};
+pub use cdr::{from_cdr, to_cdr};
+pub use error::BagError;
+pub use sequence::{
+    MESSAGE_LIMIT_BYTES, Reassembler, RecordedSequence, read_recorded_sequences, sequence_to_messages,
+};
+pub use telemetry::{ReadReport, read_measurements, read_sequences};
+pub use topics::{Role, Streams, TopicMap};

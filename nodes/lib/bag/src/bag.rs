@@ -1,0 +1,206 @@
+//! A bag on disk: its files, its topics, its messages as bytes.
+
+use std::borrow::Cow;
+use std::collections::{BTreeMap, VecDeque};
+use std::path::{Path, PathBuf};
+
+use mcap::records::Record;
+
+use crate::records::Records;
+use crate::{BagError, rosbag2};
+
+/// A message as recorded: channel (topic, schema, metadata), times, CDR bytes.
+pub type RawMessage = mcap::Message<'static>;
+
+/// A topic of a bag.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Topic {
+    /// Its name.
+    pub name: String,
+    /// Its type, such as `nav_msgs/msg/Odometry`; empty where the bag does not say.
+    pub type_name: String,
+    /// How its messages are encoded; `cdr` in ROS 2.
+    pub encoding: String,
+    /// The publishers' quality of service, as YAML; empty where not recorded.
+    pub offered_qos_profiles: String,
+}
+
+/// A bag: an `.mcap` file, or a rosbag2 folder of several that follow each other.
+#[derive(Debug, Clone)]
+pub struct Bag {
+    path: PathBuf,
+    files: Vec<PathBuf>,
+    topics: Vec<Topic>,
+}
+
+impl Bag {
+    /// Looks at a bag: finds its files and its topics (from the files' summaries, or by reading through a file that has none).
+    ///
+    /// # Errors
+    /// [`BagError::NotABag`], [`BagError::Profile`], [`BagError::Io`], [`BagError::Damaged`]; not [`BagError::Truncated`]:
+    /// what is there of a truncated bag can be read.
+    pub fn open(path: &Path) -> Result<Self, BagError> {
+        let files = rosbag2::files(path)?;
+        let mut topics = BTreeMap::new();
+        for file in &files {
+            check_profile(file)?;
+            for (name, topic) in file_topics(file)? {
+                topics.entry(name).or_insert(topic);
+            }
+        }
+        Ok(Self { path: path.to_owned(), files, topics: topics.into_values().collect() })
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Its files in order.
+    #[must_use]
+    pub fn files(&self) -> &[PathBuf] {
+        &self.files
+    }
+
+    /// Its topics, sorted by name.
+    #[must_use]
+    pub fn topics(&self) -> &[Topic] {
+        &self.topics
+    }
+
+    /// Its messages in the order of the files, which is the order of recording.
+    #[must_use]
+    pub fn messages(&self) -> Messages {
+        Messages { files: self.files.iter().cloned().collect(), open: None }
+    }
+}
+
+/// The messages of a bag. After an error nothing follows; all whole messages before the place come first.
+pub struct Messages {
+    files: VecDeque<PathBuf>,
+    open: Option<(Records, Channels)>,
+}
+
+impl Iterator for Messages {
+    type Item = Result<RawMessage, BagError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            if self.open.is_none() {
+                match Records::open(&self.files.pop_front()?) {
+                    Ok(records) => self.open = Some((records, Channels::default())),
+                    Err(error) => return Some(Err(self.stop(error))),
+                }
+            }
+            let (records, channels) = self.open.as_mut()?;
+            match channels.next_message(records) {
+                Some(Ok(message)) => return Some(Ok(message)),
+                Some(Err(error)) => return Some(Err(self.stop(error))),
+                None => self.open = None,
+            }
+        }
+    }
+}
+
+impl Messages {
+    fn stop(&mut self, error: BagError) -> BagError {
+        self.files.clear();
+        self.open = None;
+        error
+    }
+}
+
+/// Links messages to their channels and schemas.
+#[derive(Default)]
+struct Channels {
+    known: mcap::read::ChannelAccumulator<'static>,
+    topics: BTreeMap<String, Topic>,
+}
+
+impl Channels {
+    fn next_message(&mut self, records: &mut Records) -> Option<Result<RawMessage, BagError>> {
+        loop {
+            let linked = match records.next()? {
+                Ok(Record::Message { header, data }) => match self.known.get(header.channel_id) {
+                    Some(channel) => {
+                        return Some(Ok(RawMessage {
+                            channel,
+                            sequence: header.sequence,
+                            log_time: header.log_time,
+                            publish_time: header.publish_time,
+                            data: Cow::Owned(data.into_owned()),
+                        }));
+                    }
+                    None => Err(format!("a message on channel {}, which is not declared", header.channel_id)),
+                },
+                Ok(Record::Schema { header, data }) => {
+                    self.known.add_schema(header, Cow::Owned(data.into_owned())).map_err(|e| e.to_string())
+                }
+                Ok(Record::Channel(channel)) => self.add_channel(channel).map_err(|e| e.to_string()),
+                Ok(_) => Ok(()),
+                Err(error) => return Some(Err(error)),
+            };
+            if let Err(why) = linked {
+                return Some(Err(records.damaged(why)));
+            }
+        }
+    }
+}
+
+impl Channels {
+    fn add_channel(&mut self, channel: mcap::records::Channel) -> mcap::McapResult<()> {
+        let id = channel.id;
+        self.known.add_channel(channel)?;
+        if let Some(channel) = self.known.get(id) {
+            self.topics.entry(channel.topic.clone()).or_insert_with(|| Topic::of(&channel));
+        }
+        Ok(())
+    }
+}
+
+impl Topic {
+    fn of(channel: &mcap::Channel) -> Self {
+        Self {
+            name: channel.topic.clone(),
+            type_name: channel.schema.as_ref().map(|s| s.name.clone()).unwrap_or_default(),
+            encoding: channel.message_encoding.clone(),
+            offered_qos_profiles: channel.metadata.get("offered_qos_profiles").cloned().unwrap_or_default(),
+        }
+    }
+}
+
+fn check_profile(path: &Path) -> Result<(), BagError> {
+    let mut records = Records::open(path)?;
+    match records.next() {
+        Some(Ok(Record::Header(header))) if header.profile == "ros2" => Ok(()),
+        Some(Ok(Record::Header(header))) => {
+            Err(BagError::Profile { path: path.to_owned(), profile: header.profile })
+        }
+        Some(Err(error)) => Err(error),
+        _ => Err(records.damaged("the first record is not the header")),
+    }
+}
+
+/// The topics of one file.
+fn file_topics(path: &Path) -> Result<BTreeMap<String, Topic>, BagError> {
+    let mut records = Records::open(path)?;
+    if records.seek_summary()? {
+        let mut channels = Channels::default();
+        let whole = !matches!(channels.next_message(&mut records), Some(Err(_)));
+        let topics = channels.topics;
+        if whole && !topics.is_empty() {
+            return Ok(topics);
+        }
+    }
+    let mut records = Records::open(path)?;
+    let mut channels = Channels::default();
+    while let Some(message) = channels.next_message(&mut records) {
+        match message {
+            Ok(_) => {}
+            Err(BagError::Truncated { .. }) => break,
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(channels.topics)
+}

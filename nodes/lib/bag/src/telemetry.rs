@@ -1,0 +1,114 @@
+//! From a bag to measurements and sequences.
+
+use std::path::Path;
+
+use gripsight_signals::{
+    AlignConfig, Aligner, Measurement, SignalError, StateSequence, WindowConfig, WindowCutter,
+};
+use serde::Serialize;
+
+use crate::sequence::read_recorded;
+use crate::{Bag, BagError, Role, Streams, TopicMap, decode};
+
+/// What reading a bag met.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct ReadReport {
+    /// Where each stream was found.
+    pub streams: Streams,
+    /// Messages by stream, in the order of [`Role::ALL`].
+    pub counts: [usize; 4],
+    /// Messages that said nothing about their stream: joints that are not the four wheels, sensors that report "not measured".
+    pub without_content: usize,
+    /// Odometry left out because no drive command was in force.
+    pub without_drive: usize,
+    /// Messages left out because their stamp stood there already.
+    pub duplicates: usize,
+    /// Where the bag is cut off, in words; what comes before was read.
+    pub truncated: Option<String>,
+    /// The topic of the recorded sequences that were used instead of the streams.
+    pub recorded_sequences: Option<String>,
+}
+
+/// Every measurement of a bag in the order of recording. NaN and stamps that go back are found by the
+/// [`Aligner`](gripsight_signals::Aligner), not here.
+///
+/// # Errors
+/// [`BagError`]; a truncated bag is none: its whole messages are given, and the report says so.
+pub fn read_measurements(path: &Path, topics: &TopicMap) -> Result<(Vec<Measurement>, ReadReport), BagError> {
+    measurements_of(&Bag::open(path)?, topics)
+}
+
+fn measurements_of(bag: &Bag, topics: &TopicMap) -> Result<(Vec<Measurement>, ReadReport), BagError> {
+    let streams = topics.resolve(bag)?;
+    let mut report = ReadReport { streams, ..ReadReport::default() };
+    let mut measurements = Vec::new();
+    for message in bag.messages() {
+        let message = match message {
+            Ok(message) => message,
+            Err(error @ BagError::Truncated { .. }) => {
+                report.truncated = Some(error.to_string());
+                break;
+            }
+            Err(error) => return Err(error),
+        };
+        let topic = &message.channel.topic;
+        let Some(role) = report.streams.role(topic) else { continue };
+        let count = &mut report.counts[role as usize];
+        match decode::measurement(role, &message.data) {
+            Ok(Some(measurement)) => measurements.push(measurement),
+            Ok(None) => report.without_content += 1,
+            Err(error) => return Err(error.in_message(topic, *count, message.log_time)),
+        }
+        *count += 1;
+    }
+    if measurements.is_empty() {
+        return Err(BagError::Empty { path: bag.path().to_owned() });
+    }
+    Ok((measurements, report))
+}
+
+/// The state sequences of a bag. Where it holds recorded ones, exactly those; otherwise its streams, aligned and cut into windows
+/// by the rules that the telemetry node follows, so that both give the same sequences.
+///
+/// Windows are the full ones; where none is full (a short bag, an infinite window) the one window that is open at the end.
+///
+/// # Errors
+/// [`BagError`]; a truncated bag is none, see [`read_measurements`].
+pub fn read_sequences(
+    path: &Path,
+    topics: &TopicMap,
+    window: WindowConfig,
+) -> Result<(Vec<StateSequence>, ReadReport), BagError> {
+    let bag = Bag::open(path)?;
+    if let Some(topic) = topics.resolve_sequence(&bag)? {
+        let (recorded, truncated) = read_recorded(&bag, &topic)?;
+        let report = ReadReport { truncated, recorded_sequences: Some(topic), ..ReadReport::default() };
+        return Ok((recorded.into_iter().map(|r| r.sequence).collect(), report));
+    }
+    let (measurements, mut report) = measurements_of(&bag, topics)?;
+    let mut aligner = Aligner::new(AlignConfig::default());
+    let mut cutter = WindowCutter::new(window)?;
+    let mut sequences = Vec::new();
+    for measurement in measurements {
+        let stream = measurement.stream();
+        aligner.push(measurement).map_err(|source| named(&report.streams, stream, source))?;
+        while let Some(sample) = aligner.poll() {
+            sequences.extend(cutter.push(sample));
+        }
+    }
+    while let Some(sample) = aligner.drain() {
+        sequences.extend(cutter.push(sample));
+    }
+    report.without_drive = aligner.without_drive();
+    report.duplicates = aligner.duplicates();
+    if sequences.is_empty() {
+        sequences.push(cutter.rest()?);
+    }
+    Ok((sequences, report))
+}
+
+fn named(streams: &Streams, stream: &str, source: SignalError) -> BagError {
+    let role = Role::ALL.into_iter().find(|role| role.name() == stream);
+    let topic = role.and_then(|role| streams.topic(role)).unwrap_or(stream).to_owned();
+    BagError::Signal { topic, source }
+}
