@@ -1,0 +1,124 @@
+//! The road and the air around the car: friction under each wheel, bank, slope, wind.
+
+use std::f64::consts::TAU;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::car::CarParameters;
+use crate::effects::{Mechanisms, Patch};
+use crate::plant::Surroundings;
+use crate::scenario::{Friction, Scenario};
+
+/// Correlation time of gusts.
+const GUST_TIME_S: f64 = 0.8;
+
+/// The road of one run.
+#[derive(Debug, Clone)]
+pub(crate) struct Road {
+    friction: Friction,
+    patches: Vec<Patch>,
+    lap_m: Option<f64>,
+    grip: f64,
+    wear_per_min: f64,
+    bank_rad: f64,
+    slope_rad: f64,
+    wind_mps: f64,
+    gust_mps: f64,
+    gusts: [f64; 2],
+    random: ChaCha8Rng,
+}
+
+impl Road {
+    pub(crate) fn new(scenario: &Scenario, mechanisms: &Mechanisms, lap_m: Option<f64>) -> Self {
+        let mut patches: Vec<Patch> = mechanisms.patch.into_iter().collect();
+        if let Friction::Patched { patches: given, .. } = &scenario.friction {
+            patches.extend(given);
+        }
+        Self {
+            friction: scenario.friction.clone(),
+            patches,
+            lap_m,
+            grip: 1.0 + mechanisms.grip_scale,
+            wear_per_min: mechanisms.wear_per_min,
+            bank_rad: mechanisms.bank_rad,
+            slope_rad: mechanisms.slope_rad,
+            wind_mps: mechanisms.wind_mps,
+            gust_mps: mechanisms.gust_mps,
+            gusts: [0.0; 2],
+            random: ChaCha8Rng::seed_from_u64(scenario.seed ^ 0x6057_0a12),
+        }
+    }
+
+    /// What acts on a car at a station, turned by `turn_rad` against the track.
+    pub(crate) fn at(
+        &mut self,
+        time_s: f64,
+        station_m: f64,
+        turn_rad: f64,
+        car: &CarParameters,
+        dt_s: f64,
+    ) -> Surroundings {
+        let here = self.friction_now(time_s);
+        let worn = (1.0 - self.wear_per_min * time_s / 60.0).max(0.1);
+        let (sin, cos) = turn_rad.sin_cos();
+        let half = car.track_width_m / 2.0;
+        let friction = if self.patches.is_empty() {
+            [here * worn * self.grip; 4]
+        } else {
+            [(car.l_f_m, half), (car.l_f_m, -half), (-car.l_r_m, half), (-car.l_r_m, -half)].map(
+                |(x_m, y_m)| here * worn * self.grip * self.patch_factor(station_m + x_m * cos - y_m * sin),
+            )
+        };
+        let (bank_rad, slope_rad) = self.inclination(station_m);
+        let (wind_x_mps, wind_y_mps) = self.wind(dt_s);
+        Surroundings { friction, bank_rad, slope_rad, wind_x_mps, wind_y_mps }
+    }
+
+    fn friction_now(&self, time_s: f64) -> f64 {
+        match &self.friction {
+            Friction::Uniform { mu } | Friction::Patched { mu, .. } => *mu,
+            Friction::Changing { mu, mu_after, at_s, over_s } => {
+                let share = if *over_s > 0.0 { (time_s - at_s) / over_s } else { f64::from(time_s >= *at_s) };
+                mu + share.clamp(0.0, 1.0) * (mu_after - mu)
+            }
+        }
+    }
+
+    /// Friction over its usual value: a patch with edges a tenth of its length wide.
+    fn patch_factor(&self, station_m: f64) -> f64 {
+        self.patches
+            .iter()
+            .map(|patch| {
+                let into = station_m - patch.start_m;
+                let into_m = self.lap_m.map_or(into, |lap| into.rem_euclid(lap));
+                let edge_m = (0.1 * patch.length_m).max(1e-6);
+                let inside = (into_m / edge_m).min((patch.length_m - into_m) / edge_m).clamp(0.0, 1.0);
+                1.0 - patch.depth * inside
+            })
+            .product()
+    }
+
+    /// Bank and slope: on a lap, a bank over half of it and as much up as down; on a plane, the same everywhere.
+    fn inclination(&self, station_m: f64) -> (f64, f64) {
+        match self.lap_m {
+            Some(lap_m) => {
+                let turn = TAU * station_m / lap_m;
+                (self.bank_rad * 0.5 * (1.0 - turn.cos()), self.slope_rad * turn.sin())
+            }
+            None => (self.bank_rad, self.slope_rad),
+        }
+    }
+
+    fn wind(&mut self, dt_s: f64) -> (f64, f64) {
+        if self.gust_mps > 0.0 {
+            let kept = (-dt_s / GUST_TIME_S).exp();
+            for gust in &mut self.gusts {
+                let driving: f64 = StandardNormal.sample(&mut self.random);
+                *gust = kept * *gust + (1.0 - kept * kept).sqrt() * self.gust_mps * driving;
+            }
+        }
+        (self.gusts[0], self.wind_mps + self.gusts[1])
+    }
+}
