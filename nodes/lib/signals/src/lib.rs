@@ -9,6 +9,7 @@
 
 mod align;
 mod error;
+mod excitation;
 mod health;
 mod measurement;
 mod segment;
@@ -17,6 +18,7 @@ mod window;
 
 pub use align::{AlignConfig, Aligner};
 pub use error::SignalError;
+pub use excitation::Excitation;
 pub use health::{DataHealth, FrozenSpan, Gap};
 pub use measurement::{DriveSample, ImuSample, Measurement, OdometrySample, TelemetrySample, WheelsSample};
 pub use segment::{Segment, segments};
