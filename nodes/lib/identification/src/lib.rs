@@ -1,3 +1,24 @@
 //! From a state sequence to Pacejka parameters: signal corrections, residual learning, virtual steering sweep, fit, acceptance.
+//!
+//! [`identify`] is the whole way; [`Identification`] and [`train_residual`] are its halves, which run in two nodes when live.
+//! [`shooting`] is the least-squares engine underneath.
 
+mod candidate;
+mod config;
+mod error;
+mod outcome;
+mod residual_model;
+mod run;
 pub mod shooting;
+
+pub use candidate::{
+    AcceptedSet, Candidate, Estimate, FrictionPrior, PerAxle, Range, RunKey, SignalCorrections, vehicle_hash,
+};
+pub use config::{Config, Method, ResidualKind};
+pub use error::IdentificationError;
+pub use outcome::{
+    Change, HorizonError, IterationRecord, Outcome, PeakFriction, Rmse, RmseReport, SignalEstimates, Source,
+    TireCurve, Trace, WeakSignal,
+};
+pub use residual_model::{INPUTS, OUTPUTS, ResidualModel};
+pub use run::{Identification, Next, Stage, identify, train_residual};

@@ -1,0 +1,97 @@
+//! Settings of a run.
+
+use gripsight_s4::Architecture;
+use gripsight_vehicle::{MagicFormula, PacejkaParameters};
+use serde::{Deserialize, Serialize};
+
+/// How tires are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// The paper's procedure: one-step residuals, sweep at the mean speed, steady-state forces, Nelder-Mead from the initial tires.
+    Paper,
+    /// Direct shooting fit, then the residual loop with inverse dynamics; whichever predicts held-out data better.
+    #[default]
+    Robust,
+}
+
+/// Which network learns the residual.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ResidualKind {
+    /// S4D, the paper's.
+    #[default]
+    S4,
+    /// Multilayer perceptron, no memory.
+    Mlp,
+    /// Elman recurrence.
+    Rnn,
+    /// No residual: the nominal model alone.
+    None,
+}
+
+impl ResidualKind {
+    /// The network's family; `None` without a network.
+    #[must_use]
+    pub fn architecture(self) -> Option<Architecture> {
+        match self {
+            Self::S4 => Some(Architecture::S4),
+            Self::Mlp => Some(Architecture::Mlp),
+            Self::Rnn => Some(Architecture::Rnn),
+            Self::None => None,
+        }
+    }
+
+    /// Its name on topics and on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::S4 => "s4",
+            Self::Mlp => "mlp",
+            Self::Rnn => "rnn",
+            Self::None => "none",
+        }
+    }
+
+    /// The inverse of [`Self::name`].
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        [Self::S4, Self::Mlp, Self::Rnn, Self::None].into_iter().find(|kind| kind.name() == name)
+    }
+}
+
+/// Settings of a run. [`Config::default`] is what the product runs with.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// Goes into every [`RunKey`](crate::RunKey); no result depends on it.
+    pub run_id: String,
+    /// How tires are found.
+    pub method: Method,
+    /// Which network learns the residual.
+    pub residual: ResidualKind,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Tires that a run starts from, unless a previous set or a friction prior replaces them.
+    pub initial: PacejkaParameters,
+    /// Turns of the outer loop at most.
+    pub max_iterations: u32,
+    /// Converged when a turn changes the tire curves by less than this share of their peak, anywhere within the slips driven.
+    pub tolerance: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        // C and E of a usual car tire; D = 0.51 is the paper's mismatched start; the stiffness is that of a soft tire.
+        let axle = MagicFormula::from_stiffness(6.0, 1.4, 0.51, 0.0);
+        Self {
+            run_id: String::new(),
+            method: Method::Robust,
+            residual: ResidualKind::S4,
+            seed: 0,
+            initial: PacejkaParameters { front: axle, rear: axle },
+            max_iterations: 8,
+            tolerance: 0.02,
+        }
+    }
+}
