@@ -1,1 +1,61 @@
-//! What a node needs from ROS 2 and ros2-client lacks.
+//! All that a node of the suite needs from ROS 2: names, parameters, topics, clock, logs,
+//! diagnostics, a clean start and a clean end. It stands on ros2-client and RustDDS, supplies what
+//! they lack, and is the only crate that knows their quirks.
+//!
+//! ```no_run
+//! use std::future::Future;
+//! use gripsight_msgs::standard::nav_msgs::Odometry;
+//! use gripsight_runtime::{Descriptor, Error, Node, Qos, run};
+//!
+//! fn relay(node: &mut Node) -> Result<impl Future<Output = Result<(), Error>> + use<>, Error> {
+//!     let every = node.parameter("every", 1_i64, Descriptor::new("Pass on each n-th").range(1.0..=1e3))?;
+//!     let mut odometry = node.subscription::<Odometry>("odom", node.sensor_qos(50))?;
+//!     let thinned = node.publisher::<Odometry>("~/odom", Qos::reliable(10))?;
+//!     Ok(async move {
+//!         let mut count = 0;
+//!         while let Some(message) = odometry.next().await {
+//!             count += 1;
+//!             if count % every.get() == 0 {
+//!                 thinned.publish(&message).await;
+//!             }
+//!         }
+//!         Ok(())
+//!     })
+//! }
+//!
+//! fn main() -> Result<(), Error> {
+//!     run("relay", relay)
+//! }
+//! ```
+//!
+//! Not implemented: lifecycle nodes, composition, actions, services of a node's own, and type
+//! hashes in discovery (ros2-client cannot announce them; both RMWs of ROS 2 Jazzy accept that).
+
+mod args;
+mod clock;
+mod diagnostics;
+mod environment;
+mod error;
+mod logging;
+mod names;
+mod node;
+mod parameter_file;
+mod parameter_services;
+mod parameters;
+mod publisher;
+mod qos;
+mod run;
+mod subscription;
+mod value;
+mod yaml;
+
+pub use clock::Clock;
+pub use diagnostics::{Diagnostics, Level, Status};
+pub use error::Error;
+pub use node::Node;
+pub use parameters::{Descriptor, Parameter};
+pub use publisher::{Publisher, RawPublisher};
+pub use qos::Qos;
+pub use run::run;
+pub use subscription::Subscription;
+pub use value::{ParameterType, ParameterValue};

@@ -1,0 +1,196 @@
+//! The six services by which `ros2 param` reads and sets a node's parameters, and `/parameter_events`.
+//!
+//! ros2-client's own services know one mapping of services to DDS only, and no descriptors.
+
+use std::future::Future;
+use std::sync::Arc;
+
+use futures::StreamExt;
+use gripsight_msgs::standard::rcl_interfaces as rcl;
+use ros2_client::{Message, Name, Server, ServiceMapping, ServiceTypeName};
+use serde::{Deserialize, Serialize};
+use tokio::sync::mpsc;
+
+use crate::Error;
+use crate::clock::Clock;
+use crate::names::Identity;
+use crate::parameters::ParameterStore;
+use crate::qos::Qos;
+
+macro_rules! service_messages {
+    ($($name:ident { $($field:ident: $type:ty),* })*) => {$(
+        #[derive(Clone, Debug, Serialize, Deserialize)]
+        struct $name { $($field: $type),* }
+        impl Message for $name {}
+    )*};
+}
+
+service_messages! {
+    NamesRequest { names: Vec<String> }
+    GetResponse { values: Vec<rcl::ParameterValue> }
+    TypesResponse { types: Vec<u8> }
+    SetRequest { parameters: Vec<rcl::Parameter> }
+    SetResponse { results: Vec<rcl::SetParametersResult> }
+    SetAtomicallyResponse { result: rcl::SetParametersResult }
+    ListRequest { prefixes: Vec<String>, depth: u64 }
+    ListResponse { result: rcl::ListParametersResult }
+    DescribeResponse { descriptors: Vec<rcl::ParameterDescriptor> }
+}
+
+/// Answers requests about a node's parameters.
+#[derive(Clone)]
+pub(crate) struct ParameterServices {
+    pub(crate) store: Arc<ParameterStore>,
+    /// Changes, for `/parameter_events`.
+    pub(crate) events: mpsc::Sender<rcl::ParameterEvent>,
+    pub(crate) clock: Clock,
+    /// Full name of the node.
+    pub(crate) node: String,
+}
+
+impl ParameterServices {
+    /// Creates the six services and gives the future that answers them.
+    ///
+    /// # Errors
+    /// [`Error::Create`] when DDS refuses an endpoint.
+    pub(crate) fn serve(
+        self,
+        node: &mut ros2_client::Node,
+        identity: &Identity,
+        mapping: ServiceMapping,
+    ) -> Result<impl Future<Output = ()> + use<>, Error> {
+        let mut factory = Factory { node, identity, mapping };
+        let get = factory.server::<NamesRequest, GetResponse>("get_parameters", "GetParameters")?;
+        let types =
+            factory.server::<NamesRequest, TypesResponse>("get_parameter_types", "GetParameterTypes")?;
+        let set = factory.server::<SetRequest, SetResponse>("set_parameters", "SetParameters")?;
+        let set_atomically = factory.server::<SetRequest, SetAtomicallyResponse>(
+            "set_parameters_atomically",
+            "SetParametersAtomically",
+        )?;
+        let list = factory.server::<ListRequest, ListResponse>("list_parameters", "ListParameters")?;
+        let describe =
+            factory.server::<NamesRequest, DescribeResponse>("describe_parameters", "DescribeParameters")?;
+        Ok(async move {
+            tokio::join!(
+                answer(get, |request: NamesRequest| GetResponse {
+                    values: self.each(&request.names, |store, name| {
+                        store.get(name).map(|value| value.to_message())
+                    }),
+                }),
+                answer(types, |request: NamesRequest| TypesResponse {
+                    types: self
+                        .each(&request.names, |store, name| store.get(name).map(|value| value.type_id())),
+                }),
+                answer(set, |request: SetRequest| SetResponse { results: self.set_each(request) }),
+                answer(set_atomically, |request: SetRequest| SetAtomicallyResponse {
+                    result: self.set(request.parameters)
+                }),
+                answer(list, |request: ListRequest| ListResponse { result: self.list(&request) }),
+                answer(describe, |request: NamesRequest| DescribeResponse {
+                    descriptors: self.each(&request.names, ParameterStore::descriptor),
+                }),
+            );
+        })
+    }
+
+    /// One answer per name; for a name that is not declared the default, which says "not set".
+    fn each<T: Default>(
+        &self,
+        names: &[String],
+        answer: impl Fn(&ParameterStore, &str) -> Option<T>,
+    ) -> Vec<T> {
+        names.iter().map(|name| answer(&self.store, name).unwrap_or_default()).collect()
+    }
+
+    fn set_each(&self, request: SetRequest) -> Vec<rcl::SetParametersResult> {
+        request.parameters.into_iter().map(|parameter| self.set(vec![parameter])).collect()
+    }
+
+    fn set(&self, parameters: Vec<rcl::Parameter>) -> rcl::SetParametersResult {
+        let event = rcl::ParameterEvent {
+            stamp: self.clock.now(),
+            node: self.node.clone(),
+            changed_parameters: parameters.clone(),
+            ..Default::default()
+        };
+        match self.store.set(parameters) {
+            Ok(()) => {
+                // A full queue loses the event; the parameter is set all the same.
+                self.events.try_send(event).ok();
+                rcl::SetParametersResult { successful: true, reason: String::new() }
+            }
+            Err(reason) => {
+                tracing::warn!("refused to set a parameter: {reason}");
+                rcl::SetParametersResult { successful: false, reason }
+            }
+        }
+    }
+
+    /// Names at most `depth` levels below the prefixes; 0: any level; no prefix: all names.
+    fn list(&self, request: &ListRequest) -> rcl::ListParametersResult {
+        let levels = |text: &str| text.split('.').count() as u64;
+        let below = |name: &str, prefix: &str| {
+            name == prefix
+                || name
+                    .strip_prefix(prefix)
+                    .and_then(|rest| rest.strip_prefix('.'))
+                    .is_some_and(|rest| request.depth == 0 || levels(rest) <= request.depth)
+        };
+        let mut names = self.store.names();
+        names.retain(|name| {
+            if request.prefixes.is_empty() {
+                request.depth == 0 || levels(name) <= request.depth
+            } else {
+                request.prefixes.iter().any(|prefix| below(name, prefix))
+            }
+        });
+        let mut prefixes: Vec<String> = names
+            .iter()
+            .filter_map(|name| name.rsplit_once('.').map(|(prefix, _)| prefix.to_owned()))
+            .collect();
+        prefixes.dedup();
+        rcl::ListParametersResult { names, prefixes }
+    }
+}
+
+struct Factory<'a> {
+    node: &'a mut ros2_client::Node,
+    identity: &'a Identity,
+    mapping: ServiceMapping,
+}
+
+impl Factory<'_> {
+    fn server<Q, A>(&mut self, name: &str, type_name: &str) -> Result<Server<Q, A>, Error>
+    where
+        Q: Message + Clone + 'static,
+        A: Message + 'static,
+    {
+        let name = self.identity.resolve(&format!("~/{name}"))?;
+        let ros_name = Name::parse(&name).map_err(|error| Error::create(&name, error))?;
+        let type_name = ServiceTypeName::new("rcl_interfaces", type_name);
+        let qos = Qos::reliable(10).profile();
+        self.node
+            .create_server(self.mapping, &ros_name, &type_name, qos.clone(), qos)
+            .map_err(|error| Error::create(format!("service {name}"), error))
+    }
+}
+
+async fn answer<Q, A>(server: Server<Q, A>, respond: impl Fn(Q) -> A)
+where
+    Q: Message + 'static,
+    A: Message + 'static,
+{
+    let mut requests = server.receive_request_stream();
+    while let Some(request) = requests.next().await {
+        match request {
+            Ok((id, request)) => {
+                let response = respond(request);
+                if let Err(error) = server.async_send_response(id, response).await {
+                    tracing::warn!("cannot answer a parameter request: {error}");
+                }
+            }
+            Err(error) => tracing::warn!("cannot read a parameter request: {error}"),
+        }
+    }
+}
