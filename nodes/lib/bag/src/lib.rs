@@ -4,6 +4,8 @@
 //! - [`read_sequences`] and [`read_measurements`]: a bag's telemetry, topics found by type or by a [`TopicMap`].
 //! - [`Bag`]: its topics and its messages as bytes.
 //! - [`decode`], [`encode`]: messages and samples; [`sequence_to_messages`], [`Reassembler`]: sequences in chunks.
+//! - [`identification_messages`]: candidates, residual models and outcomes.
+//! - [`BagWriter`], [`recover`]: writing bags, and rewriting what is left of a damaged one.
 //! - [`from_cdr`], [`to_cdr`]: messages and bytes.
 //!
 //! A bag is an `.mcap` file or a rosbag2 folder; its memory is bounded by one chunk, and no length in it is trusted.
@@ -13,17 +15,22 @@ mod cdr;
 pub mod decode;
 pub mod encode;
 mod error;
+pub mod identification_messages;
 mod records;
+mod recover;
 mod rosbag2;
 mod sequence;
 mod telemetry;
 mod topics;
+mod writer;
 
 pub use bag::{Bag, Messages, RawMessage, Topic};
 pub use cdr::{from_cdr, to_cdr};
 pub use error::BagError;
+pub use recover::{Recovered, recover};
 pub use sequence::{
     MESSAGE_LIMIT_BYTES, Reassembler, RecordedSequence, read_recorded_sequences, sequence_to_messages,
 };
 pub use telemetry::{ReadReport, read_measurements, read_sequences};
 pub use topics::{Role, Streams, TopicMap};
+pub use writer::BagWriter;

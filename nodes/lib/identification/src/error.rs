@@ -63,6 +63,14 @@ pub enum IdentificationError {
     /// The run has ended already.
     #[error("the run has ended: it takes no further residual model")]
     Ended,
+    /// A message names something that this version does not know.
+    #[error("{what} `{got}` is not known here")]
+    Unknown {
+        /// What was named.
+        what: &'static str,
+        /// The name.
+        got: String,
+    },
     /// The fit found no finite parameters.
     #[error("{what} is not finite")]
     NotFinite {

@@ -199,6 +199,8 @@ pub struct Outcome {
     pub slip_range_rad: PerAxle<Range>,
     /// Forward speeds visited.
     pub v_x_range_mps: Range,
+    /// Mean forward speed while moving.
+    pub mean_speed_mps: f64,
     /// What was taken out of the signals.
     pub signals: SignalCorrections,
     /// The same with intervals.

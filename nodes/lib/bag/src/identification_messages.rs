@@ -1,0 +1,283 @@
+//! Identification's types as messages and back: candidates, residual models, outcomes. Numbers survive bit for bit.
+
+use gripsight_identification::{
+    Candidate, Estimate, FrictionPrior, INPUTS, IdentificationError, OUTPUTS, Outcome, PeakFriction, Range,
+    ResidualKind, ResidualModel, RunKey, SignalCorrections,
+};
+use gripsight_msgs as msg;
+use gripsight_vehicle::{MagicFormula, PacejkaParameters, VehicleParameters};
+
+/// The key of a run as a message.
+#[must_use]
+pub fn handshake(key: &RunKey) -> msg::Handshake {
+    msg::Handshake {
+        run_id: key.run_id.clone(),
+        sequence_id: key.sequence_id,
+        iteration: key.iteration,
+        vehicle_hash: key.vehicle_hash.clone(),
+        seed: key.seed,
+    }
+}
+
+/// The inverse of [`handshake`].
+#[must_use]
+pub fn run_key(handshake: &msg::Handshake) -> RunKey {
+    RunKey {
+        run_id: handshake.run_id.clone(),
+        sequence_id: handshake.sequence_id,
+        iteration: handshake.iteration,
+        vehicle_hash: handshake.vehicle_hash.clone(),
+        seed: handshake.seed,
+    }
+}
+
+/// A candidate that asks for its residual model: status PROPOSED. What only an outcome knows is NaN.
+#[must_use]
+pub fn proposed(candidate: &Candidate, vehicle: &VehicleParameters) -> msg::PacejkaParams {
+    let unknown = msg::Interval { value: f64::NAN, low: f64::NAN, high: f64::NAN };
+    let nowhere = msg::Range { low: f64::NAN, high: f64::NAN };
+    let peak = msg::PeakFriction { friction: unknown, reached: false, from_prior: false };
+    msg::PacejkaParams {
+        header: msg::standard::std_msgs::Header::default(),
+        handshake: handshake(&candidate.key),
+        status: msg::PacejkaParams::PROPOSED,
+        reason: String::new(),
+        front: formula(&candidate.phi_p.front),
+        rear: formula(&candidate.phi_p.rear),
+        front_load_n: vehicle.static_load_front_n(),
+        rear_load_n: vehicle.static_load_rear_n(),
+        front_cornering_stiffness_n_per_rad: unknown,
+        rear_cornering_stiffness_n_per_rad: unknown,
+        front_peak: peak,
+        rear_peak: peak,
+        front_slip_rad: nowhere,
+        rear_slip_rad: nowhere,
+        signals: signals(&candidate.corrections),
+        v_x_mean_mps: candidate.mean_speed_mps,
+    }
+}
+
+/// The candidate of a message with status PROPOSED; `None` for any other status.
+#[must_use]
+pub fn candidate(message: &msg::PacejkaParams) -> Option<Candidate> {
+    (message.status == msg::PacejkaParams::PROPOSED).then(|| Candidate {
+        key: run_key(&message.handshake),
+        phi_p: PacejkaParameters { front: axle(&message.front), rear: axle(&message.rear) },
+        corrections: corrections(&message.signals),
+        mean_speed_mps: message.v_x_mean_mps,
+    })
+}
+
+/// The end of a run: status ACCEPTED or REJECTED, the reasons joined.
+#[must_use]
+pub fn result(outcome: &Outcome) -> msg::PacejkaParams {
+    let (k, peak, slip) =
+        (&outcome.cornering_stiffness_n_per_rad, &outcome.peak_friction, &outcome.slip_range_rad);
+    msg::PacejkaParams {
+        header: msg::standard::std_msgs::Header::default(),
+        handshake: handshake(&outcome.key),
+        status: if outcome.accepted { msg::PacejkaParams::ACCEPTED } else { msg::PacejkaParams::REJECTED },
+        reason: outcome.reasons.join("; "),
+        front: formula(&outcome.phi_p.front),
+        rear: formula(&outcome.phi_p.rear),
+        front_load_n: outcome.vehicle.static_load_front_n(),
+        rear_load_n: outcome.vehicle.static_load_rear_n(),
+        front_cornering_stiffness_n_per_rad: interval(&k.front),
+        rear_cornering_stiffness_n_per_rad: interval(&k.rear),
+        front_peak: peak_friction(&peak.front),
+        rear_peak: peak_friction(&peak.rear),
+        front_slip_rad: range(&slip.front),
+        rear_slip_rad: range(&slip.rear),
+        signals: signals(&outcome.signals),
+        v_x_mean_mps: outcome.mean_speed_mps,
+    }
+}
+
+/// A residual model as a message; `training_time_s` is what the sender's clock took.
+#[must_use]
+pub fn residual_model(model: &ResidualModel, training_time_s: f64) -> msg::ResidualModel {
+    msg::ResidualModel {
+        header: msg::standard::std_msgs::Header::default(),
+        handshake: handshake(&model.key),
+        front: formula(&model.phi_p.front),
+        rear: formula(&model.phi_p.rear),
+        architecture: model.architecture.name().to_owned(),
+        d_model: model.d_model as u32,
+        d_state: model.d_state as u32,
+        layers: model.layers as u32,
+        dt_s: model.dt_s,
+        horizon: model.horizon as u32,
+        inputs: INPUTS.map(str::to_owned).to_vec(),
+        input_mean: model.input_mean.clone(),
+        input_scale: model.input_scale.clone(),
+        outputs: OUTPUTS.map(str::to_owned).to_vec(),
+        output_scale: model.output_scale.clone(),
+        weights: model.weights.clone(),
+        front_slip_rad: range(&model.slip_range_rad.front),
+        rear_slip_rad: range(&model.slip_range_rad.rear),
+        v_x_mps: range(&model.v_x_range_mps),
+        epochs: model.epochs as u32,
+        samples: model.samples as u32,
+        training_loss: model.training_loss,
+        validation_loss: model.validation_loss,
+        training_time_s,
+    }
+}
+
+/// The inverse of [`residual_model`].
+///
+/// # Errors
+/// [`IdentificationError::Unknown`] for an architecture, inputs or outputs that this version does not know.
+pub fn learned_model(message: &msg::ResidualModel) -> Result<ResidualModel, IdentificationError> {
+    let unknown = |what, got: String| IdentificationError::Unknown { what, got };
+    let architecture = ResidualKind::from_name(&message.architecture)
+        .ok_or_else(|| unknown("architecture", message.architecture.clone()))?;
+    for (what, got, expected) in
+        [("inputs", &message.inputs, &INPUTS[..]), ("outputs", &message.outputs, &OUTPUTS[..])]
+    {
+        if got != expected {
+            return Err(unknown(what, got.join(", ")));
+        }
+    }
+    let back = |r: &msg::Range| Range { low: r.low, high: r.high };
+    Ok(ResidualModel {
+        key: run_key(&message.handshake),
+        phi_p: PacejkaParameters { front: axle(&message.front), rear: axle(&message.rear) },
+        architecture,
+        d_model: message.d_model as usize,
+        d_state: message.d_state as usize,
+        layers: message.layers as usize,
+        dt_s: message.dt_s,
+        horizon: message.horizon as usize,
+        input_mean: message.input_mean.clone(),
+        input_scale: message.input_scale.clone(),
+        output_scale: message.output_scale.clone(),
+        weights: message.weights.clone(),
+        slip_range_rad: gripsight_identification::PerAxle {
+            front: back(&message.front_slip_rad),
+            rear: back(&message.rear_slip_rad),
+        },
+        v_x_range_mps: back(&message.v_x_mps),
+        epochs: message.epochs as usize,
+        samples: message.samples as usize,
+        training_loss: message.training_loss,
+        validation_loss: message.validation_loss,
+    })
+}
+
+/// The friction of a prior that may be used; `None` where the sender says that it may not.
+#[must_use]
+pub fn friction_prior(message: &msg::FrictionPrior) -> Option<FrictionPrior> {
+    message.valid.then_some(FrictionPrior { mu: message.mu, sigma: message.sigma })
+}
+
+fn formula(f: &MagicFormula) -> msg::MagicFormula {
+    msg::MagicFormula { b: f.b, c: f.c, d: f.d, e: f.e }
+}
+
+fn axle(f: &msg::MagicFormula) -> MagicFormula {
+    MagicFormula { b: f.b, c: f.c, d: f.d, e: f.e }
+}
+
+fn interval(e: &Estimate) -> msg::Interval {
+    msg::Interval { value: e.value, low: e.low, high: e.high }
+}
+
+fn range(r: &Range) -> msg::Range {
+    msg::Range { low: r.low, high: r.high }
+}
+
+fn peak_friction(p: &PeakFriction) -> msg::PeakFriction {
+    msg::PeakFriction {
+        friction: msg::Interval { value: p.value, low: p.low, high: p.high },
+        reached: p.reached,
+        from_prior: p.from_prior,
+    }
+}
+
+fn signals(c: &SignalCorrections) -> msg::SignalCorrections {
+    msg::SignalCorrections {
+        steering_delay_s: c.steering_delay_s,
+        steering_gain: c.steering_gain,
+        steering_offset_rad: c.steering_offset_rad,
+        v_y_lever_arm_m: c.v_y_lever_arm_m,
+        v_y_bias_mps: c.v_y_bias_mps,
+        yaw_rate_bias_radps: c.yaw_rate_bias_radps,
+    }
+}
+
+fn corrections(c: &msg::SignalCorrections) -> SignalCorrections {
+    SignalCorrections {
+        steering_delay_s: c.steering_delay_s,
+        steering_gain: c.steering_gain,
+        steering_offset_rad: c.steering_offset_rad,
+        v_y_lever_arm_m: c.v_y_lever_arm_m,
+        v_y_bias_mps: c.v_y_bias_mps,
+        yaw_rate_bias_radps: c.yaw_rate_bias_radps,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gripsight_identification::PerAxle;
+
+    fn key() -> RunKey {
+        RunKey {
+            run_id: "a".into(),
+            sequence_id: 7,
+            iteration: 2,
+            vehicle_hash: "0123456789abcdef".into(),
+            seed: 5,
+        }
+    }
+
+    fn tires() -> PacejkaParameters {
+        PacejkaParameters::from_array([0.1, 1.0 / 3.0, 0.51, -0.7, 5.1, 1.3, 1.1, 0.2])
+    }
+
+    #[test]
+    fn a_candidate_survives_its_message() {
+        let sent = Candidate {
+            key: key(),
+            phi_p: tires(),
+            corrections: SignalCorrections::from_array([0.1, 0.9, 1e-3, -0.2, 1.0 / 7.0, 3e-17]),
+            mean_speed_mps: 10.0 / 3.0,
+        };
+        let message = proposed(&sent, &VehicleParameters::f1tenth());
+        assert_eq!(candidate(&message), Some(sent));
+        let other = msg::PacejkaParams { status: msg::PacejkaParams::ACCEPTED, ..message };
+        assert_eq!(candidate(&other), None);
+    }
+
+    #[test]
+    fn a_residual_model_survives_its_message_and_a_foreign_one_is_refused() {
+        let side = Range { low: -0.1, high: 0.2 };
+        let sent = ResidualModel {
+            key: key(),
+            phi_p: tires(),
+            architecture: ResidualKind::S4,
+            d_model: 2,
+            d_state: 4,
+            layers: 1,
+            dt_s: 0.01,
+            horizon: 10,
+            input_mean: vec![1.0 / 3.0; 4],
+            input_scale: vec![2.0; 4],
+            output_scale: vec![1e-3; 2],
+            weights: vec![f64::MIN_POSITIVE, -0.0, 1.0 / 3.0],
+            slip_range_rad: PerAxle { front: side, rear: side },
+            v_x_range_mps: Range { low: 1.0, high: 2.0 },
+            epochs: 3,
+            samples: 4,
+            training_loss: 0.5,
+            validation_loss: 0.6,
+        };
+        let message = residual_model(&sent, 0.1);
+        assert_eq!(learned_model(&message).unwrap(), sent);
+        assert!(
+            learned_model(&msg::ResidualModel { architecture: "gru".into(), ..message.clone() }).is_err()
+        );
+        assert!(learned_model(&msg::ResidualModel { inputs: vec!["v_x_mps".into()], ..message }).is_err());
+    }
+}
