@@ -1,1 +1,46 @@
 //! Road pictures to a friction prior: decoding, quality gates, network, filter over distance.
+//!
+//! The network answers with a distribution p over road states (dry, wet, standing water, snow, ice). With the friction
+//! basis B (one coefficient and one spread per state, [`Basis`]) the prior is, after the paper's equation for the expected
+//! friction,
+//!
+//! ```text
+//! mu = p . B            sigma^2 = sum_i p_i (sigma_i^2 + B_i^2) - mu^2
+//! ```
+//!
+//! A network always answers, also about a covered lens. So a picture passes gates before it counts, in this order:
+//! transport (age, layout, a frozen camera), quality of the picture (dark, saturated, noisy, blurred), the network's own
+//! doubt (entropy, energy); then p is averaged over the distance travelled. What fails a gate yields `valid = false`, its
+//! [`Reason`] and the uninformative prior: never zero, never the last value.
+//!
+//! [`FrictionEstimator`] is the whole pipeline. Nothing here reads a clock or the environment: stamps, distances and folders
+//! come in as arguments.
+
+mod basis;
+mod bayer;
+mod decode;
+mod error;
+mod estimator;
+mod files;
+mod filter;
+mod network;
+mod picture;
+mod quality;
+mod tensor;
+#[cfg(feature = "tract")]
+mod tract;
+mod transport;
+
+pub use basis::{Basis, FrictionClass, Prior};
+pub use decode::decode;
+pub use error::FrictionError;
+pub use estimator::{Estimate, FrictionEstimator, ModelLimits, Motion, Reason, Settings, Source};
+pub use files::{find_library, find_model};
+pub use filter::{DistanceFilter, FilterSettings};
+pub use network::{Network, OnnxRuntime};
+pub use picture::{Encoding, Frame, FrameData, RawPicture, Region, RgbPicture};
+pub use quality::{QualityLimits, QualityStatistics};
+pub use tensor::{INPUT_SIDE, Preprocessor, normalise};
+#[cfg(feature = "tract")]
+pub use tract::Tract;
+pub use transport::{TransportGate, TransportLimits};

@@ -1,0 +1,383 @@
+//! The whole pipeline: a frame in, a friction prior out.
+
+use serde::Deserialize;
+
+use crate::basis::{Basis, Prior};
+use crate::decode::decode;
+use crate::error::FrictionError;
+use crate::filter::{DistanceFilter, FilterSettings};
+use crate::network::Network;
+use crate::picture::{Frame, Region, RgbPicture};
+use crate::quality::{QualityLimits, QualityStatistics};
+use crate::tensor::{Preprocessor, normalise};
+use crate::transport::{TransportGate, TransportLimits};
+
+/// Why a picture, or the lack of one, yields no usable prior.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reason {
+    /// No picture has arrived, or none for too long.
+    NoPicture,
+    /// The picture's stamp is too old, or ahead of the clock.
+    Stale,
+    /// A newer picture was already used.
+    OutOfOrder,
+    /// The encoding is not supported.
+    UnknownEncoding,
+    /// Size, step and number of bytes contradict each other.
+    BadLayout,
+    /// The compressed data is cut off or damaged.
+    Undecodable,
+    /// The picture has not changed while the car drove on.
+    Frozen,
+    /// Too dark.
+    Dark,
+    /// Over-exposed.
+    Saturated,
+    /// Nothing but noise.
+    Noisy,
+    /// Blurred or blank.
+    Blurred,
+    /// The network cannot decide: the entropy of p is too high.
+    Undecided,
+    /// Unlike the pictures trained on: the energy of the logits is too high.
+    Unfamiliar,
+    /// The engine failed.
+    NetworkFailed,
+}
+
+impl Reason {
+    /// One word, lower case, for messages and JSON.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::NoPicture => "no_picture",
+            Self::Stale => "stale",
+            Self::OutOfOrder => "out_of_order",
+            Self::UnknownEncoding => "unknown_encoding",
+            Self::BadLayout => "bad_layout",
+            Self::Undecodable => "undecodable",
+            Self::Frozen => "frozen",
+            Self::Dark => "dark",
+            Self::Saturated => "saturated",
+            Self::Noisy => "noisy",
+            Self::Blurred => "blurred",
+            Self::Undecided => "undecided",
+            Self::Unfamiliar => "unfamiliar",
+            Self::NetworkFailed => "network_failed",
+        }
+    }
+
+    fn of_error(error: &FrictionError) -> Self {
+        match error {
+            FrictionError::UnknownEncoding { .. } => Self::UnknownEncoding,
+            FrictionError::BadLayout { .. }
+            | FrictionError::BadSize { .. }
+            | FrictionError::Resize { .. } => Self::BadLayout,
+            FrictionError::Truncated { .. } | FrictionError::Undecodable { .. } => Self::Undecodable,
+            _ => Self::NetworkFailed,
+        }
+    }
+}
+
+/// Where a prior comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Source {
+    /// The configured value: there is no network.
+    Configured,
+    /// The network's reading of pictures.
+    Camera,
+}
+
+/// A friction prior.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// Stamp of the newest picture that it rests on, nanoseconds; none where there was no picture.
+    pub stamp_ns: Option<i64>,
+    /// Where it comes from.
+    pub source: Source,
+    /// Why it is not usable. `None`: it is.
+    pub reason: Option<Reason>,
+    /// What the failing part said, where it said something.
+    pub detail: Option<String>,
+    /// Expected peak friction coefficient; the uninformative prior's where not usable.
+    pub mu: f64,
+    /// Standard deviation of `mu`.
+    pub sigma: f64,
+    /// p, averaged over the distance travelled; uniform where not usable or configured.
+    pub probability: Vec<f64>,
+    /// Entropy of the newest picture's own p over that of a uniform p, 0 to 1.
+    pub entropy: f64,
+    /// Energy of the newest picture's logits, -ln sum exp z; zero where the network was not asked.
+    pub energy: f64,
+    /// Statistics of the newest picture's region of interest.
+    pub quality: Option<QualityStatistics>,
+    /// Distance that the average spans, metres.
+    pub distance_m: f64,
+    /// Pictures in the average.
+    pub pictures: u32,
+}
+
+impl Estimate {
+    /// Whether `mu` may be used.
+    #[must_use]
+    pub fn valid(&self) -> bool {
+        self.reason.is_none()
+    }
+}
+
+/// All settings of the pipeline.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// The part of the picture that shows road.
+    pub region: Region,
+    /// Limits of the transport gate.
+    pub transport: TransportLimits,
+    /// Limits of the picture-quality gate.
+    pub quality: QualityLimits,
+    /// Limits of the network's doubt.
+    pub model: ModelLimits,
+    /// The filter over distance.
+    pub filter: FilterSettings,
+    /// What to publish while there is no network.
+    pub configured: Prior,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            region: Region::WHOLE,
+            transport: TransportLimits::default(),
+            quality: QualityLimits::default(),
+            model: ModelLimits::default(),
+            filter: FilterSettings::default(),
+            configured: Prior { mu: 0.85, sigma: 0.25 },
+        }
+    }
+}
+
+/// Limits of the gate on the network's own doubt; set on validation pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ModelLimits {
+    /// Largest entropy of p, as a share of that of a uniform p.
+    pub most_entropy: f64,
+    /// Largest energy, -ln sum exp z.
+    pub most_energy: f64,
+}
+
+impl Default for ModelLimits {
+    fn default() -> Self {
+        Self { most_entropy: 0.85, most_energy: 0.0 }
+    }
+}
+
+/// What the odometry says at the time of a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Motion {
+    /// Distance travelled since any fixed moment, metres; none while there is no odometry.
+    pub distance_m: Option<f64>,
+}
+
+/// Reads friction off a stream of pictures.
+pub struct FrictionEstimator {
+    settings: Settings,
+    basis: Basis,
+    network: Option<Box<dyn Network>>,
+    preprocessor: Preprocessor,
+    transport: TransportGate,
+    filter: DistanceFilter,
+    seen: Option<RgbPicture>,
+}
+
+impl std::fmt::Debug for FrictionEstimator {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("FrictionEstimator").field("settings", &self.settings).finish_non_exhaustive()
+    }
+}
+
+/// What one picture says on its own.
+struct Reading {
+    p: Vec<f64>,
+    entropy: f64,
+    energy: f64,
+    quality: QualityStatistics,
+    refused: Option<Reason>,
+}
+
+impl FrictionEstimator {
+    /// `network`: none leaves the estimator on `settings.configured`.
+    #[must_use]
+    pub fn new(settings: Settings, basis: Basis, network: Option<Box<dyn Network>>) -> Self {
+        Self {
+            settings,
+            basis,
+            network,
+            preprocessor: Preprocessor::default(),
+            transport: TransportGate::default(),
+            filter: DistanceFilter::default(),
+            seen: None,
+        }
+    }
+
+    /// The friction basis in use.
+    #[must_use]
+    pub fn basis(&self) -> &Basis {
+        &self.basis
+    }
+
+    /// Forgets all pictures: after a clock that jumped back.
+    pub fn reset(&mut self) {
+        self.transport = TransportGate::default();
+        self.filter = DistanceFilter::default();
+    }
+
+    /// The last region of interest as the network saw it.
+    #[must_use]
+    pub fn last_input(&self) -> Option<&RgbPicture> {
+        self.seen.as_ref()
+    }
+
+    /// What to publish while no picture arrives.
+    #[must_use]
+    pub fn without_picture(&self) -> Estimate {
+        match self.network {
+            Some(_) => self.refuse(None, Reason::NoPicture, None),
+            None => self.configured(),
+        }
+    }
+
+    /// Takes in one frame of a stream at time `now_ns` (nanoseconds, the clock of the stamps).
+    pub fn update(&mut self, frame: &Frame<'_>, now_ns: i64, motion: &Motion) -> Estimate {
+        if self.network.is_none() {
+            return self.configured();
+        }
+        let stamp = Some(frame.stamp_ns);
+        let limits = &self.settings.transport;
+        let late = self.transport.check(limits, frame.stamp_ns, now_ns, &frame.data, motion.distance_m);
+        if let Some(reason) = late {
+            return self.refuse(stamp, reason, None);
+        }
+        let reading = match self.read(frame) {
+            Ok(reading) => reading,
+            Err(error) => return self.refuse(stamp, Reason::of_error(&error), Some(error.to_string())),
+        };
+        let seen = |mut estimate: Estimate| {
+            estimate.entropy = reading.entropy;
+            estimate.energy = reading.energy;
+            estimate.quality = Some(reading.quality);
+            estimate
+        };
+        if let Some(reason) = reading.refused {
+            return seen(self.refuse(stamp, reason, None));
+        }
+        let p = self.filter.update(&self.settings.filter, &reading.p, motion.distance_m).to_vec();
+        let Prior { mu, sigma } = self.basis.expect(&p);
+        seen(Estimate {
+            stamp_ns: stamp,
+            source: Source::Camera,
+            reason: None,
+            detail: None,
+            mu,
+            sigma,
+            probability: p,
+            entropy: 0.0,
+            energy: 0.0,
+            quality: None,
+            distance_m: self.filter.span_m(&self.settings.filter),
+            pictures: self.filter.pictures(),
+        })
+    }
+
+    /// Reads one picture on its own: no age, no stream, no average.
+    pub fn read_single(&mut self, frame: &Frame<'_>) -> Estimate {
+        self.reset();
+        self.update(frame, frame.stamp_ns, &Motion::default())
+    }
+
+    /// Decode, look, ask.
+    fn read(&mut self, frame: &Frame<'_>) -> Result<Reading, FrictionError> {
+        let crop = decode(&frame.data, &self.settings.region)?;
+        let input = self.seen.insert(self.preprocessor.resize(&crop)?);
+        let quality = QualityStatistics::measure(input);
+        let classes = self.basis.classes.len();
+        let uniform = vec![1.0 / classes as f64; classes];
+        if let Some(reason) = self.settings.quality.check(&quality) {
+            return Ok(Reading { p: uniform, entropy: 1.0, energy: 0.0, quality, refused: Some(reason) });
+        }
+        let tensor = normalise(input);
+        let Some(network) = self.network.as_mut() else {
+            return Ok(Reading {
+                p: uniform,
+                entropy: 1.0,
+                energy: 0.0,
+                quality,
+                refused: Some(Reason::NetworkFailed),
+            });
+        };
+        let logits = network.logits(&tensor)?;
+        if logits.len() != classes || !logits.iter().all(|z| z.is_finite()) {
+            let message = format!("expected {classes} finite logits, got {logits:?}");
+            return Err(FrictionError::Inference { message });
+        }
+        let (p, energy) = softmax(&logits);
+        let entropy =
+            -p.iter().filter(|p| **p > 0.0).map(|p| p * p.ln()).sum::<f64>() / (classes as f64).ln();
+        let limits = &self.settings.model;
+        let refused = if entropy > limits.most_entropy {
+            Some(Reason::Undecided)
+        } else if energy > limits.most_energy {
+            Some(Reason::Unfamiliar)
+        } else {
+            None
+        };
+        Ok(Reading { p, entropy, energy, quality, refused })
+    }
+
+    fn flat(&self) -> Vec<f64> {
+        let n = self.basis.classes.len();
+        vec![1.0 / n as f64; n]
+    }
+
+    fn refuse(&self, stamp_ns: Option<i64>, reason: Reason, detail: Option<String>) -> Estimate {
+        let Prior { mu, sigma } = self.basis.uninformative;
+        self.bare(stamp_ns, Source::Camera, Some(reason), detail, mu, sigma)
+    }
+
+    fn configured(&self) -> Estimate {
+        let Prior { mu, sigma } = self.settings.configured;
+        self.bare(None, Source::Configured, None, None, mu, sigma)
+    }
+
+    fn bare(
+        &self,
+        stamp_ns: Option<i64>,
+        source: Source,
+        reason: Option<Reason>,
+        detail: Option<String>,
+        mu: f64,
+        sigma: f64,
+    ) -> Estimate {
+        Estimate {
+            stamp_ns,
+            source,
+            reason,
+            detail,
+            mu,
+            sigma,
+            probability: self.flat(),
+            entropy: 1.0,
+            energy: 0.0,
+            quality: None,
+            distance_m: 0.0,
+            pictures: 0,
+        }
+    }
+}
+
+/// p and the energy -ln sum exp z, free of overflow.
+fn softmax(logits: &[f32]) -> (Vec<f64>, f64) {
+    let top = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let weights: Vec<f64> = logits.iter().map(|z| f64::from(z - top).exp()).collect();
+    let sum: f64 = weights.iter().sum();
+    (weights.iter().map(|w| w / sum).collect(), -(f64::from(top) + sum.ln()))
+}

@@ -1,0 +1,71 @@
+//! Where the ONNX Runtime library and the model are looked for.
+
+use std::path::{Path, PathBuf};
+
+use crate::error::FrictionError;
+
+/// The library's file names: the plain one, and the versioned one that a bare wheel unpacks to.
+const LIBRARY: &str = "libonnxruntime.so";
+/// The trained network's file name.
+const MODEL: &str = "road_mobilenet_v3_small.onnx";
+
+/// The ONNX Runtime library: `explicit`, else beside the program, else `.deps/onnxruntime` in any folder above it.
+///
+/// `program_folder` is the folder of the running program.
+///
+/// # Errors
+/// [`FrictionError::NotFound`] with the places looked at.
+pub fn find_library(explicit: Option<&Path>, program_folder: &Path) -> Result<PathBuf, FrictionError> {
+    let beside = [program_folder.join(LIBRARY)];
+    let above = program_folder.ancestors().map(|a| a.join(".deps/onnxruntime").join(LIBRARY));
+    find("ONNX Runtime library", explicit, beside.into_iter().chain(above))
+}
+
+/// The model: `explicit`, else beside the program, else in the installed share folder or the source tree above it.
+///
+/// # Errors
+/// [`FrictionError::NotFound`] with the places looked at.
+pub fn find_model(explicit: Option<&Path>, program_folder: &Path) -> Result<PathBuf, FrictionError> {
+    let beside = [program_folder.join(MODEL)];
+    let above = program_folder.ancestors().flat_map(|a| {
+        ["share/gripsight_camera_prior/model", "nodes/camera_prior/model"]
+            .map(|place| a.join(place).join(MODEL))
+    });
+    find("model", explicit, beside.into_iter().chain(above))
+}
+
+fn find(
+    name: &'static str,
+    explicit: Option<&Path>,
+    places: impl Iterator<Item = PathBuf>,
+) -> Result<PathBuf, FrictionError> {
+    let searched: Vec<PathBuf> = match explicit {
+        Some(path) => vec![path.to_path_buf()],
+        None => places.collect(),
+    };
+    match searched.iter().find(|p| p.is_file()) {
+        Some(path) => Ok(path.clone()),
+        None => Err(FrictionError::NotFound { name, searched }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_library_is_found_in_an_ancestor_and_an_explicit_path_is_final() {
+        let root = tempfile::tempdir().unwrap();
+        let deps = root.path().join(".deps/onnxruntime");
+        let program = root.path().join("target/debug");
+        std::fs::create_dir_all(&deps).unwrap();
+        std::fs::create_dir_all(&program).unwrap();
+        std::fs::write(deps.join(LIBRARY), b"x").unwrap();
+        assert_eq!(find_library(None, &program).unwrap(), deps.join(LIBRARY));
+        std::fs::write(program.join(LIBRARY), b"x").unwrap();
+        assert_eq!(find_library(None, &program).unwrap(), program.join(LIBRARY));
+        let missing = root.path().join("nowhere.so");
+        let text = find_library(Some(&missing), &program).unwrap_err().to_string();
+        assert!(text.contains("nowhere.so"), "{text}");
+    }
+}

@@ -1,0 +1,73 @@
+//! The network: a tensor in, one logit per road state out.
+
+use std::path::Path;
+
+use ort::environment::Environment;
+use ort::session::Session;
+use ort::session::builder::GraphOptimizationLevel;
+use ort::value::TensorRef;
+
+use crate::error::FrictionError;
+use crate::tensor::INPUT_SIDE;
+
+/// Something that runs the model.
+pub trait Network: Send {
+    /// The logits of one picture: `tensor` holds three planes of [`INPUT_SIDE`]^2 values.
+    ///
+    /// # Errors
+    /// [`FrictionError::Inference`].
+    fn logits(&mut self, tensor: &[f32]) -> Result<Vec<f32>, FrictionError>;
+}
+
+/// ONNX Runtime, loaded at run time, on one thread that does not spin.
+#[derive(Debug)]
+pub struct OnnxRuntime {
+    session: Session,
+}
+
+impl OnnxRuntime {
+    /// Loads the library (once per process: a later call with another path keeps the first) and the model.
+    ///
+    /// # Errors
+    /// [`FrictionError::Library`] or [`FrictionError::Model`].
+    pub fn load(library: &Path, model: &Path) -> Result<Self, FrictionError> {
+        // `ort::init` panics where the library is missing; `init_from` tells.
+        let unusable = |message: String| FrictionError::Library { path: library.to_path_buf(), message };
+        let environment = ort::init_from(library)
+            .map_err(|e| unusable(e.to_string()))?
+            .with_telemetry(false)
+            .build()
+            .map_err(|e| unusable(e.to_string()))?;
+        let session = open(&environment, model)
+            .map_err(|message| FrictionError::Model { path: model.to_path_buf(), message })?;
+        Ok(Self { session })
+    }
+}
+
+fn open(environment: &Environment, model: &Path) -> Result<Session, String> {
+    let text = |e: ort::Error<ort::session::builder::SessionBuilder>| e.to_string();
+    let mut builder = Session::builder(environment)
+        .map_err(|e| e.to_string())?
+        .with_optimization_level(GraphOptimizationLevel::All)
+        .map_err(text)?
+        .with_intra_threads(1)
+        .map_err(text)?
+        .with_intra_op_spinning(false)
+        .map_err(text)?;
+    let session = builder.commit_from_file(model).map_err(|e| e.to_string())?;
+    match (session.inputs().len(), session.outputs().len()) {
+        (1, 1) => Ok(session),
+        (inputs, outputs) => Err(format!("expected 1 input and 1 output, got {inputs} and {outputs}")),
+    }
+}
+
+impl Network for OnnxRuntime {
+    fn logits(&mut self, tensor: &[f32]) -> Result<Vec<f32>, FrictionError> {
+        let failed = |e: ort::Error| FrictionError::Inference { message: e.to_string() };
+        let side = INPUT_SIDE as usize;
+        let input = TensorRef::from_array_view(([1, 3, side, side], tensor)).map_err(failed)?;
+        let outputs = self.session.run(ort::inputs![input]).map_err(failed)?;
+        let (_, logits) = outputs[0].try_extract_tensor::<f32>().map_err(failed)?;
+        Ok(logits.to_vec())
+    }
+}

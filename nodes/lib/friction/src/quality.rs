@@ -1,0 +1,187 @@
+//! Is this a picture at all? Statistics of the resized crop, cheap enough for every frame.
+
+use serde::Deserialize;
+
+use crate::estimator::Reason;
+use crate::picture::RgbPicture;
+
+/// What is measured on the crop at the network's input size.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct QualityStatistics {
+    /// Mean luma, 0 to 255.
+    pub mean: f64,
+    /// Share of pixels whose luma is below 12.
+    pub dark: f64,
+    /// Share of pixels whose luma is above 250.
+    pub saturated: f64,
+    /// Standard deviation of the pixel noise in levels of luma, after Immerkaer (1996): structure that no lens passes.
+    pub noise: f64,
+    /// Mean step of luma between neighbouring blocks of 4 x 4 pixels: what a picture keeps unless it is badly blurred.
+    pub structure: f64,
+}
+
+impl QualityStatistics {
+    /// Measures a picture of at least 8 x 8 pixels; a smaller one yields zeros, which the limits refuse.
+    #[must_use]
+    pub fn measure(picture: &RgbPicture) -> Self {
+        let (width, height) = (picture.width as usize, picture.height as usize);
+        let (pixels, _) = picture.data.as_chunks::<3>();
+        if width < 8 || height < 8 || pixels.len() != width * height {
+            return Self::default();
+        }
+        // BT.601 in 8 bit integers.
+        let luma: Vec<i32> = pixels
+            .iter()
+            .map(|p| (77 * i32::from(p[0]) + 150 * i32::from(p[1]) + 29 * i32::from(p[2])) >> 8)
+            .collect();
+        let count = luma.len() as f64;
+        let share = |test: fn(i32) -> bool| luma.iter().filter(|v| test(**v)).count() as f64 / count;
+        Self {
+            mean: luma.iter().map(|v| f64::from(*v)).sum::<f64>() / count,
+            dark: share(|v| v < 12),
+            saturated: share(|v| v > 250),
+            noise: noise(&luma, width),
+            structure: structure(&luma, width),
+        }
+    }
+}
+
+/// sqrt(pi/2)/6 times the mean of |luma * [[1 -2 1] [-2 4 -2] [1 -2 1]]|.
+fn noise(luma: &[i32], width: usize) -> f64 {
+    let rows: Vec<&[i32]> = luma.chunks_exact(width).collect();
+    let (mut sum, mut count) = (0i64, 0i64);
+    for w in rows.windows(3) {
+        let column = |i: usize| w[0][i] - 2 * w[1][i] + w[2][i];
+        let (mut left, mut middle) = (column(0), column(1));
+        for i in 2..width {
+            let right = column(i);
+            sum += i64::from((left - 2 * middle + right).abs());
+            (left, middle) = (middle, right);
+        }
+        count += width as i64 - 2;
+    }
+    (std::f64::consts::PI / 2.0).sqrt() / 6.0 * sum as f64 / count.max(1) as f64
+}
+
+/// Mean absolute second difference of the means of 4 x 4 blocks, along rows and columns.
+fn structure(luma: &[i32], width: usize) -> f64 {
+    let (columns, rows) = (width / 4, luma.len() / width / 4);
+    let mut blocks = vec![0i32; columns * rows];
+    for y in 0..rows * 4 {
+        for x in 0..columns * 4 {
+            blocks[y / 4 * columns + x / 4] += luma[y * width + x];
+        }
+    }
+    let (mut sum, mut count) = (0i64, 0i64);
+    let mut bend = |a: usize, b: usize, c: usize| {
+        sum += i64::from((blocks[a] - 2 * blocks[b] + blocks[c]).abs());
+        count += 1;
+    };
+    for y in 0..rows {
+        for x in 0..columns {
+            let at = y * columns + x;
+            if x >= 1 && x + 1 < columns {
+                bend(at - 1, at, at + 1);
+            }
+            if y >= 1 && y + 1 < rows {
+                bend(at - columns, at, at + columns);
+            }
+        }
+    }
+    sum as f64 / 16.0 / count.max(1) as f64
+}
+
+/// Limits on [`QualityStatistics`]; set on validation pictures so that hardly any honest one is refused.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct QualityLimits {
+    /// Mean luma below which the picture is dark.
+    pub least_mean: f64,
+    /// Share of dark pixels above which the picture is dark.
+    pub most_dark: f64,
+    /// Share of saturated pixels above which the picture is over-exposed.
+    pub most_saturated: f64,
+    /// Noise above which nothing can be read, levels.
+    pub most_noise: f64,
+    /// Structure below which the picture is blurred or blank, levels.
+    pub least_structure: f64,
+}
+
+impl Default for QualityLimits {
+    fn default() -> Self {
+        Self {
+            least_mean: 20.0,
+            most_dark: 0.5,
+            most_saturated: 0.6,
+            most_noise: 35.0,
+            least_structure: 0.25,
+        }
+    }
+}
+
+impl QualityLimits {
+    /// The first limit that the picture breaks.
+    #[must_use]
+    pub fn check(&self, seen: &QualityStatistics) -> Option<Reason> {
+        if seen.mean < self.least_mean || seen.dark > self.most_dark {
+            Some(Reason::Dark)
+        } else if seen.saturated > self.most_saturated {
+            Some(Reason::Saturated)
+        } else if seen.noise > self.most_noise {
+            Some(Reason::Noisy)
+        } else if seen.structure < self.least_structure {
+            Some(Reason::Blurred)
+        } else {
+            None
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    fn grey(side: u32, mut value: impl FnMut(u32, u32) -> f64) -> RgbPicture {
+        let mut data = Vec::new();
+        for y in 0..side {
+            for x in 0..side {
+                data.extend([value(x, y).clamp(0.0, 255.0) as u8; 3]);
+            }
+        }
+        RgbPicture { width: side, height: side, data }
+    }
+
+    fn noisy(sigma: f64) -> RgbPicture {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        // The sum of twelve uniform numbers has variance one.
+        grey(224, |_, _| 128.0 + sigma * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0))
+    }
+
+    #[test]
+    fn the_noise_estimate_finds_the_noise_that_was_put_in() {
+        for sigma in [3.0, 10.0, 25.0] {
+            assert_relative_eq!(QualityStatistics::measure(&noisy(sigma)).noise, sigma, max_relative = 0.05);
+        }
+    }
+
+    #[test]
+    fn a_slope_is_neither_noise_nor_structure() {
+        let slope = QualityStatistics::measure(&grey(224, |x, _| f64::from(x)));
+        assert!(slope.noise < 0.1 && slope.structure < 0.1, "{slope:?}");
+    }
+
+    #[test]
+    fn each_limit_has_its_reason() {
+        let limits = QualityLimits::default();
+        let reason = |p: &RgbPicture| limits.check(&QualityStatistics::measure(p));
+        assert_eq!(reason(&grey(224, |_, _| 3.0)), Some(Reason::Dark));
+        assert_eq!(reason(&grey(224, |_, _| 255.0)), Some(Reason::Saturated));
+        assert_eq!(reason(&noisy(60.0)), Some(Reason::Noisy));
+        assert_eq!(reason(&grey(224, |_, _| 120.0)), Some(Reason::Blurred));
+        assert_eq!(reason(&noisy(12.0)), None);
+        assert_eq!(reason(&grey(4, |_, _| 120.0)), Some(Reason::Dark));
+    }
+}

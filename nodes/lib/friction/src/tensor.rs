@@ -1,0 +1,58 @@
+//! Pixels to the network's input.
+//!
+//! The resize is fast_image_resize's convolution with a bilinear kernel, which equals the antialiased resize of torchvision
+//! and PIL within one level of 255; training uses those. The crop comes before the resize.
+
+use fast_image_resize::images::{Image, ImageRef};
+use fast_image_resize::{FilterType, PixelType, ResizeAlg, ResizeOptions, Resizer};
+
+use crate::error::FrictionError;
+use crate::picture::RgbPicture;
+
+/// Width and height of the network's input, pixels.
+pub const INPUT_SIDE: u32 = 224;
+
+/// Mean and standard deviation of ImageNet's red, green, blue, on the scale 0 to 1.
+const MEAN: [f32; 3] = [0.485, 0.456, 0.406];
+const STD: [f32; 3] = [0.229, 0.224, 0.225];
+
+/// Resizes crops; holds the resizer's buffers.
+#[derive(Debug)]
+pub struct Preprocessor {
+    resizer: Resizer,
+    options: ResizeOptions,
+}
+
+impl Default for Preprocessor {
+    fn default() -> Self {
+        let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(FilterType::Bilinear));
+        Self { resizer: Resizer::new(), options }
+    }
+}
+
+impl Preprocessor {
+    /// The crop at [`INPUT_SIDE`] x [`INPUT_SIDE`] pixels, its sides stretched to fit.
+    ///
+    /// # Errors
+    /// [`FrictionError::Resize`] where the picture's size does not match its data.
+    pub fn resize(&mut self, picture: &RgbPicture) -> Result<RgbPicture, FrictionError> {
+        let failed = |message: String| FrictionError::Resize { message };
+        let source = ImageRef::new(picture.width, picture.height, &picture.data, PixelType::U8x3)
+            .map_err(|e| failed(e.to_string()))?;
+        let mut target = Image::new(INPUT_SIDE, INPUT_SIDE, PixelType::U8x3);
+        self.resizer.resize(&source, &mut target, &self.options).map_err(|e| failed(e.to_string()))?;
+        Ok(RgbPicture { width: INPUT_SIDE, height: INPUT_SIDE, data: target.into_vec() })
+    }
+}
+
+/// Channels first, (x / 255 - mean) / std: three planes of `width * height` values.
+#[must_use]
+pub fn normalise(picture: &RgbPicture) -> Vec<f32> {
+    let (pixels, _) = picture.data.as_chunks::<3>();
+    let mut out = Vec::with_capacity(pixels.len() * 3);
+    for k in 0..3 {
+        let (scale, shift) = (1.0 / (255.0 * STD[k]), -MEAN[k] / STD[k]);
+        out.extend(pixels.iter().map(|p| f32::from(p[k]) * scale + shift));
+    }
+    out
+}
