@@ -6,6 +6,7 @@
 mod candidate;
 mod config;
 mod error;
+pub mod export;
 mod outcome;
 mod residual_model;
 mod run;

@@ -63,15 +63,17 @@ pub fn read_tires(text: &str) -> Result<PacejkaParameters, ExportError> {
 }
 
 fn checked(tires: PacejkaParameters) -> Result<PacejkaParameters, ExportError> {
-    const NAMES: [&str; 8] = ["B front", "C front", "D front", "E front", "B rear", "C rear", "D rear", "E rear"];
-    for (place, (name, got)) in NAMES.into_iter().zip(tires.to_array()).enumerate() {
-        let is_curvature = place % 4 == 3;
-        if is_curvature && !got.is_finite() {
-            return Err(ExportError::Parameter { name, got, must: "finite" });
-        }
-        if !is_curvature && !(got.is_finite() && got > 0.0) {
-            return Err(ExportError::Parameter { name, got, must: "positive and finite" });
-        }
+    // E may have either sign; that it is finite, the YAML reader has seen to.
+    let numbers = [
+        ("B front", tires.front.b),
+        ("C front", tires.front.c),
+        ("D front", tires.front.d),
+        ("B rear", tires.rear.b),
+        ("C rear", tires.rear.c),
+        ("D rear", tires.rear.d),
+    ];
+    match numbers.into_iter().find(|(_, got)| !(got.is_finite() && *got > 0.0)) {
+        Some((name, got)) => Err(ExportError::Parameter { name, got, must: "positive and finite" }),
+        None => Ok(tires),
     }
-    Ok(tires)
 }

@@ -16,8 +16,8 @@ pub struct Provenance {
     pub data_stamp_ns: i64,
     /// Version of the tool.
     pub tool_version: String,
-    /// [`VehicleParameters::hash`] of the car that the tires belong to.
-    pub vehicle_hash: u64,
+    /// The parameters of the car that the tires belong to, see [`crate::vehicle_hash`].
+    pub vehicle_hash: String,
     /// Seed of every random number.
     pub seed: u64,
     /// The command that made it.
@@ -45,7 +45,7 @@ impl Provenance {
         };
         line("# ", &format!("tires of {}, identified by gripsight {}", self.car, self.tool_version));
         line(STAMP_COMMENT, &format!("{}, {}", self.stamp(), self.bag));
-        line("# ", &format!("vehicle hash {:016x}, seed {}", self.vehicle_hash, self.seed));
+        line("# ", &format!("vehicle hash {}, seed {}", self.vehicle_hash, self.seed));
         line("# ", &format!("command: {}", self.command));
         self.notes.iter().for_each(|note| line("# note: ", note));
         text
@@ -58,7 +58,9 @@ impl Provenance {
 #[must_use]
 pub fn mpc_yaml(tires: &PacejkaParameters, floor: &str, provenance: &Provenance) -> String {
     let mut text = provenance.comments();
-    text.push_str("# F_y = friction_coeff * D * F_z * sin(C * atan(B*a - E*(B*a - atan(B*a)))), slip angle a in rad\n");
+    text.push_str(
+        "# F_y = friction_coeff * D * F_z * sin(C * atan(B*a - E*(B*a - atan(B*a)))), slip angle a in rad\n",
+    );
     text.push_str("friction_coeff: 1.0\n");
     for (axle, tire) in [('f', &tires.front), ('r', &tires.rear)] {
         for (letter, value) in [('B', tire.b), ('C', tire.c), ('D', tire.d), ('E', tire.e)] {
