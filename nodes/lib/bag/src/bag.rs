@@ -72,7 +72,7 @@ impl Bag {
     /// Its messages in the order of the files, which is the order of recording.
     #[must_use]
     pub fn messages(&self) -> Messages {
-        Messages { files: self.files.iter().cloned().collect(), open: None }
+        Messages::of(self.files.iter().cloned())
     }
 }
 
@@ -104,6 +104,11 @@ impl Iterator for Messages {
 }
 
 impl Messages {
+    /// The messages of these files, one after the other.
+    pub(crate) fn of(files: impl IntoIterator<Item = PathBuf>) -> Self {
+        Self { files: files.into_iter().collect(), open: None }
+    }
+
     fn stop(&mut self, error: BagError) -> BagError {
         self.files.clear();
         self.open = None;
@@ -165,12 +170,12 @@ impl Topic {
             name: channel.topic.clone(),
             type_name: channel.schema.as_ref().map(|s| s.name.clone()).unwrap_or_default(),
             encoding: channel.message_encoding.clone(),
-            offered_qos_profiles: channel.metadata.get("offered_qos_profiles").cloned().unwrap_or_default(),
+            offered_qos_profiles: channel.metadata.get(rosbag2::QOS_KEY).cloned().unwrap_or_default(),
         }
     }
 }
 
-fn check_profile(path: &Path) -> Result<(), BagError> {
+pub(crate) fn check_profile(path: &Path) -> Result<(), BagError> {
     let mut records = Records::open(path)?;
     match records.next() {
         Some(Ok(Record::Header(header))) if header.profile == "ros2" => Ok(()),

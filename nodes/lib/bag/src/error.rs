@@ -1,4 +1,4 @@
-//! Errors of this crate.
+//! Errors of this crate. Each says all it knows in one line; causes are part of it.
 
 use std::path::PathBuf;
 
@@ -9,12 +9,12 @@ use gripsight_signals::SignalError;
 #[non_exhaustive]
 pub enum BagError {
     /// The operating system refused.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {error}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        error: std::io::Error,
     },
     /// Neither an MCAP file nor a rosbag2 folder of MCAP files.
     #[error("{}: not a bag gripsight can read: {why}", path.display())]
@@ -123,7 +123,7 @@ pub enum BagError {
         encoding: String,
     },
     /// A message does not decode.
-    #[error("{topic}, message {index} (logged at {log_time_s:.6} s): {source}")]
+    #[error("{topic}, message {index} (logged at {log_time_s:.6} s): {error}")]
     Message {
         /// The topic.
         topic: String,
@@ -132,7 +132,7 @@ pub enum BagError {
         /// When it was logged.
         log_time_s: f64,
         /// What is wrong.
-        source: Box<BagError>,
+        error: Box<BagError>,
     },
     /// Bytes too few for the encapsulation header of CDR.
     #[error("{len} bytes are too few for a CDR message")]
@@ -179,12 +179,12 @@ pub enum BagError {
         chunks: u32,
     },
     /// The samples themselves are wrong.
-    #[error("{topic}: {source}")]
+    #[error("{topic}: {error}")]
     Signal {
         /// The topic they came from.
         topic: String,
         /// What is wrong.
-        source: SignalError,
+        error: SignalError,
     },
     /// A setting is wrong, or the samples are too few to work on.
     #[error(transparent)]
@@ -197,7 +197,7 @@ pub enum BagError {
         /// What is wrong, with its place.
         why: String,
     },
-    /// Writing failed.
+    /// A bag cannot be written.
     #[error("{}: {why}", path.display())]
     Write {
         /// The file.
@@ -205,16 +205,32 @@ pub enum BagError {
         /// What is wrong.
         why: String,
     },
+    /// A message type whose definition is not known here.
+    #[error("{topic}: {error}")]
+    Schema {
+        /// The topic to be written.
+        topic: String,
+        /// What is wrong.
+        error: gripsight_msgs::Error,
+    },
+    /// An effect that cannot be injected.
+    #[error("effect `{given}`: {why}")]
+    Effect {
+        /// The effect as given.
+        given: String,
+        /// What is wrong, and what is possible.
+        why: String,
+    },
 }
 
 impl BagError {
     pub(crate) fn io(path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Self + '_ {
-        |source| Self::Io { path: path.to_owned(), source }
+        |error| Self::Io { path: path.to_owned(), error }
     }
 
     /// Says which message of a bag the error is about.
     pub(crate) fn in_message(self, topic: &str, index: usize, log_time_ns: u64) -> Self {
         let log_time_s = log_time_ns as f64 * 1e-9;
-        Self::Message { topic: topic.to_owned(), index, log_time_s, source: Box::new(self) }
+        Self::Message { topic: topic.to_owned(), index, log_time_s, error: Box::new(self) }
     }
 }

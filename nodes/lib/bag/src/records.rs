@@ -130,7 +130,7 @@ impl Records {
         Ok(())
     }
 
-    /// The next record that matters here (header, schema, channel, message, metadata, footer). The footer is the last.
+    /// The next record that matters here (header, schema, channel, message, footer). The footer is the last.
     pub(crate) fn next(&mut self) -> Option<Result<Record<'_>, BagError>> {
         if self.done {
             return None;
@@ -169,14 +169,9 @@ impl Records {
                 None => Some(self.advance_in_file()?),
             };
             match opcode {
-                Some(
-                    matters @ (op::HEADER
-                    | op::SCHEMA
-                    | op::CHANNEL
-                    | op::MESSAGE
-                    | op::METADATA
-                    | op::FOOTER),
-                ) => return Ok(matters),
+                Some(matters @ (op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::FOOTER)) => {
+                    return Ok(matters);
+                }
                 _ => {}
             }
         }

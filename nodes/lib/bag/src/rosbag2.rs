@@ -1,10 +1,16 @@
 //! The rosbag2 folder: `metadata.yaml` and the files that it names.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::BagError;
+
+/// Under this key a channel's metadata hold the publishers' quality of service.
+pub(crate) const QOS_KEY: &str = "offered_qos_profiles";
+/// Under this key a channel's metadata hold the hash of its message type.
+pub(crate) const HASH_KEY: &str = "topic_type_hash";
 
 /// What is read of `metadata.yaml`; the rest is left alone.
 #[derive(Deserialize)]
@@ -75,4 +81,122 @@ fn mcap_files(folder: &Path) -> Result<Vec<PathBuf>, BagError> {
         (number, stem)
     });
     Ok(files)
+}
+
+/// What `metadata.yaml` tells of a bag, gathered while it is written.
+#[derive(Default)]
+pub(crate) struct Content {
+    topics: BTreeMap<String, (TopicMetadata, u64)>,
+    messages: u64,
+    /// Log times of the earliest and the latest message.
+    span_ns: Option<(u64, u64)>,
+}
+
+impl Content {
+    /// A topic that will be written to.
+    pub(crate) fn add_topic(&mut self, channel: &mcap::Channel) {
+        let metadata = TopicMetadata {
+            name: channel.topic.clone(),
+            r#type: channel.schema.as_ref().map(|s| s.name.clone()).unwrap_or_default(),
+            serialization_format: channel.message_encoding.clone(),
+            offered_qos_profiles: [],
+            type_description_hash: channel.metadata.get(HASH_KEY).cloned().unwrap_or_default(),
+        };
+        self.topics.entry(channel.topic.clone()).or_insert((metadata, 0));
+    }
+
+    /// A message that was written.
+    pub(crate) fn add_message(&mut self, topic: &str, log_time_ns: u64) {
+        self.messages += 1;
+        if let Some((_, count)) = self.topics.get_mut(topic) {
+            *count += 1;
+        }
+        let (first_ns, last_ns) = self.span_ns.unwrap_or((log_time_ns, log_time_ns));
+        self.span_ns = Some((first_ns.min(log_time_ns), last_ns.max(log_time_ns)));
+    }
+}
+
+#[derive(Clone, Serialize)]
+struct TopicMetadata {
+    name: String,
+    r#type: String,
+    serialization_format: String,
+    offered_qos_profiles: [(); 0],
+    type_description_hash: String,
+}
+
+/// `metadata.yaml`, version 9, as rosbag2 of ROS 2 Jazzy writes it.
+#[derive(Serialize)]
+struct MetadataOut {
+    rosbag2_bagfile_information: InformationOut,
+}
+
+#[derive(Serialize)]
+struct InformationOut {
+    version: u8,
+    storage_identifier: &'static str,
+    duration: Nanoseconds,
+    starting_time: SinceEpoch,
+    message_count: u64,
+    topics_with_message_count: Vec<TopicOut>,
+    compression_format: &'static str,
+    compression_mode: &'static str,
+    relative_file_paths: [String; 1],
+    files: [FileOut; 1],
+    custom_data: Option<()>,
+    ros_distro: &'static str,
+}
+
+#[derive(Serialize, Clone, Copy)]
+struct Nanoseconds {
+    nanoseconds: u64,
+}
+
+#[derive(Serialize, Clone, Copy)]
+struct SinceEpoch {
+    nanoseconds_since_epoch: u64,
+}
+
+#[derive(Serialize)]
+struct TopicOut {
+    topic_metadata: TopicMetadata,
+    message_count: u64,
+}
+
+#[derive(Serialize)]
+struct FileOut {
+    path: String,
+    starting_time: SinceEpoch,
+    duration: Nanoseconds,
+    message_count: u64,
+}
+
+/// Writes a folder's `metadata.yaml` beside its one file.
+pub(crate) fn write_metadata(folder: &Path, file: &Path, content: &Content) -> Result<(), BagError> {
+    let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let (first_ns, last_ns) = content.span_ns.unwrap_or_default();
+    let starting_time = SinceEpoch { nanoseconds_since_epoch: first_ns };
+    let duration = Nanoseconds { nanoseconds: last_ns - first_ns };
+    let message_count = content.messages;
+    let topics = content.topics.values().cloned();
+    let information = InformationOut {
+        version: 9,
+        storage_identifier: "mcap",
+        duration,
+        starting_time,
+        message_count,
+        topics_with_message_count: topics
+            .map(|(topic_metadata, message_count)| TopicOut { topic_metadata, message_count })
+            .collect(),
+        compression_format: "",
+        compression_mode: "",
+        relative_file_paths: [name.clone()],
+        files: [FileOut { path: name, starting_time, duration, message_count }],
+        custom_data: None,
+        ros_distro: "jazzy",
+    };
+    let path = folder.join("metadata.yaml");
+    let text = serde_saphyr::to_string(&MetadataOut { rosbag2_bagfile_information: information })
+        .map_err(|e| BagError::Write { path: path.clone(), why: e.to_string() })?;
+    std::fs::write(&path, text).map_err(BagError::io(&path))
 }

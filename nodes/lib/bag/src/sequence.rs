@@ -234,7 +234,7 @@ pub(crate) fn read_recorded(
             continue;
         }
         let whole = from_cdr(&message.data).and_then(|part| reassembler.push(part));
-        sequences.extend(whole.map_err(|source| source.in_message(topic, index, message.log_time))?);
+        sequences.extend(whole.map_err(|error| error.in_message(topic, index, message.log_time))?);
         index += 1;
     }
     if sequences.is_empty() {

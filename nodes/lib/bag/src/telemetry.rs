@@ -91,7 +91,7 @@ pub fn read_sequences(
     let mut sequences = Vec::new();
     for measurement in measurements {
         let stream = measurement.stream();
-        aligner.push(measurement).map_err(|source| named(&report.streams, stream, source))?;
+        aligner.push(measurement).map_err(|error| named(&report.streams, stream, error))?;
         while let Some(sample) = aligner.poll() {
             sequences.extend(cutter.push(sample));
         }
@@ -107,8 +107,8 @@ pub fn read_sequences(
     Ok((sequences, report))
 }
 
-fn named(streams: &Streams, stream: &str, source: SignalError) -> BagError {
+fn named(streams: &Streams, stream: &str, error: SignalError) -> BagError {
     let role = Role::ALL.into_iter().find(|role| role.name() == stream);
     let topic = role.and_then(|role| streams.topic(role)).unwrap_or(stream).to_owned();
-    BagError::Signal { topic, source }
+    BagError::Signal { topic, error }
 }
