@@ -35,7 +35,11 @@ impl Layer for Gelu {
         self.width
     }
 
-    fn forward(&mut self, _pass: &Pass, _weights: &[f64], x: &[f64], y: &mut [f64]) -> Result<(), Error> {
+    fn forward(&mut self, pass: &Pass, _weights: &[f64], x: &[f64], y: &mut [f64]) -> Result<(), Error> {
+        if !pass.training {
+            self.step(&[], &mut [], x, y);
+            return Ok(());
+        }
         self.derivative.resize(x.len(), 0.0);
         for ((y, derivative), &x) in y.iter_mut().zip(&mut self.derivative).zip(x) {
             (*y, *derivative) = gelu(x);

@@ -24,7 +24,7 @@ use rand_chacha::ChaCha8Rng;
 pub enum ParameterGroup {
     /// Ordinary weights: the learning rate, and weight decay.
     Ordinary,
-    /// `log_dt, log_a_real, a_imag` and biases of none: their own rate, no decay.
+    /// `log_dt, log_a_real, a_imag`: their own rate, no decay.
     StateSpace,
 }
 

@@ -25,7 +25,12 @@ pub enum Schedule {
     Cosine,
 }
 
-/// Settings of the trainer. The rates, decay and dropout are those of the S4D authors' example.
+/// Settings of the trainer.
+///
+/// The paper leaves them open. The defaults were chosen on a simulated car (relaxation, a lagging servo, three levels
+/// of noise; not a plant that results are published on): with few hundred updates on one batch, rates three to ten times those
+/// of the S4D authors' example (0.01 and 0.001) leave half the error, and dropout costs accuracy at every level of
+/// noise, early stopping being regularisation enough. The paper's network has dropout: 0.1 is the usual rate.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TrainingConfig {
@@ -55,11 +60,11 @@ impl Default for TrainingConfig {
     fn default() -> Self {
         Self {
             epochs_max: 300,
-            learning_rate: 1e-2,
-            state_space_learning_rate: 1e-3,
+            learning_rate: 3e-2,
+            state_space_learning_rate: 1e-2,
             schedule: Schedule::Cosine,
             weight_decay: 1e-2,
-            dropout: 0.1,
+            dropout: 0.0,
             gradient_norm_max: 1.0,
             patience: 40,
             improvement_min: 1e-4,

@@ -27,8 +27,7 @@ fn run(
 #[test]
 fn s4_learns_a_second_order_lag_that_no_memoryless_network_can() {
     let (training, held_out) = lag_sets(2);
-    let settings =
-        TrainingConfig { epochs_max: 400, dropout: 0.0, weight_decay: 0.0, ..TrainingConfig::default() };
+    let settings = TrainingConfig { epochs_max: 400, weight_decay: 0.0, ..TrainingConfig::default() };
     let loss = |architecture| {
         let config = NetworkConfig { architecture, inputs: 2, ..NetworkConfig::default() };
         let (network, report) = run(config, (&training, Some(&held_out)), &settings);
@@ -46,7 +45,7 @@ fn s4_learns_a_second_order_lag_that_no_memoryless_network_can() {
 fn the_same_seed_gives_the_same_bits_and_another_does_not() {
     for architecture in ARCHITECTURES {
         let set = noise_set(9, (3, 2), &[80, 50]);
-        let settings = TrainingConfig { epochs_max: 20, ..TrainingConfig::default() };
+        let settings = TrainingConfig { epochs_max: 20, dropout: 0.1, ..TrainingConfig::default() };
         let weights = |seed| {
             let settings = TrainingConfig { seed, ..settings.clone() };
             run(small(architecture), (&set, None), &settings).0.weights().to_vec()
@@ -62,8 +61,7 @@ fn the_same_seed_gives_the_same_bits_and_another_does_not() {
 fn early_stopping_keeps_the_best_weights_and_never_worse_than_the_start() {
     // Noise cannot be learned: the training loss falls while that of other noise rises.
     let (training, validation) = (noise_set(1, (3, 2), &[60]), noise_set(50, (3, 2), &[60]));
-    let settings =
-        TrainingConfig { patience: 15, dropout: 0.0, weight_decay: 0.0, ..TrainingConfig::default() };
+    let settings = TrainingConfig { patience: 15, weight_decay: 0.0, ..TrainingConfig::default() };
     let (network, report) = run(small(Architecture::S4), (&training, Some(&validation)), &settings);
     assert_eq!(report.stop_reason, StopReason::EarlyStopping);
     assert_eq!(report.epochs, report.best_epoch + 15);
@@ -134,7 +132,6 @@ fn divergence_is_told_and_leaves_finite_weights() {
         let settings = TrainingConfig {
             learning_rate: 1e300,
             state_space_learning_rate: 1e300,
-            dropout: 0.0,
             ..TrainingConfig::default()
         };
         let (network, report) = run(small(architecture), (&set, Some(&set)), &settings);

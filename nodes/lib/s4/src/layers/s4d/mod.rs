@@ -20,6 +20,8 @@
 mod convolution;
 mod discretization;
 mod kernel;
+#[cfg(test)]
+mod tests;
 
 use super::{Backward, BlockSpec, Layer, ParameterGroup, Pass, add_scaled, dot};
 use crate::Error;
