@@ -8,6 +8,9 @@ use crate::tire::TireParameters;
 /// Standard gravity.
 pub const GRAVITY_MPS2: f64 = 9.81;
 
+/// Load sensitivity of the tires' friction: its relative loss per relative growth of the load.
+pub(crate) const LOAD_SENSITIVITY: f64 = 0.5;
+
 /// Body roll on the springs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RollParameters {
@@ -117,6 +120,13 @@ impl CarParameters {
         self.l_f_m + self.l_r_m
     }
 
+    /// Share of its grip that an axle loses at the limit by the lateral load transfer of this car as it stands: the
+    /// natural size of `lateral_load_transfer`.
+    pub fn own_load_transfer_loss(&self, road_friction: f64) -> f64 {
+        let limit = road_friction * (self.tire_front.grip + self.tire_rear.grip) / 2.0;
+        LOAD_SENSITIVITY * (2.0 * self.h_cg_m * limit / self.track_width_m).min(1.0).powi(2)
+    }
+
     /// Speed below which slips are taken over this speed, so that standstill stays well posed.
     pub fn low_speed_mps(&self) -> f64 {
         0.3 * (GRAVITY_MPS2 * self.wheelbase_m()).sqrt()
@@ -201,13 +211,13 @@ fn f1tenth() -> CarParameters {
             cornering_stiffness_per_rad: 8.6,
             longitudinal_stiffness: 12.0,
             grip: 0.97,
-            sliding_share: 0.85,
+            sliding_share: 0.76,
         },
         tire_rear: TireParameters {
             cornering_stiffness_per_rad: 10.2,
             longitudinal_stiffness: 12.0,
             grip: 1.0,
-            sliding_share: 0.85,
+            sliding_share: 0.76,
         },
         roll: RollParameters {
             gradient_rad_per_g: 0.05,
@@ -246,13 +256,13 @@ fn formula_student() -> CarParameters {
             cornering_stiffness_per_rad: 15.5,
             longitudinal_stiffness: 20.0,
             grip: 1.0,
-            sliding_share: 0.88,
+            sliding_share: 0.72,
         },
         tire_rear: TireParameters {
             cornering_stiffness_per_rad: 17.5,
             longitudinal_stiffness: 20.0,
             grip: 1.03,
-            sliding_share: 0.88,
+            sliding_share: 0.72,
         },
         roll: RollParameters {
             gradient_rad_per_g: 0.02,
@@ -291,13 +301,13 @@ fn race_car() -> CarParameters {
             cornering_stiffness_per_rad: 18.0,
             longitudinal_stiffness: 22.0,
             grip: 1.0,
-            sliding_share: 0.87,
+            sliding_share: 0.70,
         },
         tire_rear: TireParameters {
             cornering_stiffness_per_rad: 21.0,
             longitudinal_stiffness: 22.0,
             grip: 1.04,
-            sliding_share: 0.87,
+            sliding_share: 0.70,
         },
         roll: RollParameters {
             gradient_rad_per_g: 0.008,
@@ -336,13 +346,13 @@ fn passenger_car() -> CarParameters {
             cornering_stiffness_per_rad: 13.5,
             longitudinal_stiffness: 17.0,
             grip: 0.96,
-            sliding_share: 0.85,
+            sliding_share: 0.76,
         },
         tire_rear: TireParameters {
             cornering_stiffness_per_rad: 17.0,
             longitudinal_stiffness: 17.0,
             grip: 1.0,
-            sliding_share: 0.85,
+            sliding_share: 0.76,
         },
         roll: RollParameters {
             gradient_rad_per_g: 0.08,

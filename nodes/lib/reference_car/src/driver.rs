@@ -51,11 +51,15 @@ pub(crate) struct Driver {
     wheelbase_m: f64,
     max_steering_rad: f64,
     understeer_rad_per_mps2: f64,
+    l_f_m: f64,
+    peak_slip_rad: f64,
     duration_s: f64,
     dither_rad: f64,
     dither: [(f64, f64); 6],
 }
 
+/// Slip at the tire's peak over the slip at which the linear tire would reach the peak force.
+const PEAK_SLIP: f64 = 2.5;
 /// Speed controller's gain.
 const SPEED_GAIN_1PS: f64 = 3.0;
 /// When a manoeuvre's steering begins.
@@ -100,6 +104,9 @@ impl Driver {
             wheelbase_m: car.wheelbase_m(),
             max_steering_rad: car.max_steering_rad,
             understeer_rad_per_mps2: understeer(car),
+            l_f_m: car.l_f_m,
+            peak_slip_rad: PEAK_SLIP * scenario.friction.nominal() * car.tire_front.grip
+                / car.tire_front.cornering_stiffness_per_rad,
             duration_s: scenario.duration_s,
             dither_rad: settings.dither_rad,
             dither,
@@ -167,6 +174,9 @@ impl Driver {
             let late = wanted - view.yaw_rate_radps;
             steering_rad += self.understeer_rad_per_mps2 * wanted * view.v_x_mps;
             steering_rad += 0.25 * self.wheelbase_m * late / view.v_x_mps.max(1.0);
+            // More slip than the front tires' peak only scrubs.
+            let front = (view.v_y_mps + self.l_f_m * view.yaw_rate_radps).atan2(view.v_x_mps.max(0.1));
+            steering_rad = steering_rad.clamp(front - self.peak_slip_rad, front + self.peak_slip_rad);
         }
         let wide = view.place.offset_m.abs() / track.half_width_m();
         let sliding = (slip_rad.abs() - 0.2).max(0.0) * 3.0 + (wide - 0.8).max(0.0) * 0.5;

@@ -3,19 +3,19 @@
 //! ```text
 //! m (v_x' - v_y r) = sum F_x - drag - m g sin(slope)            m (v_y' + v_x r) = sum F_y + wind - m g sin(bank)
 //! I_z r' = sum (x_i F_y,i - y_i F_x,i) + wind                   I_w w_i' = T_i - R (F_x,i + c F_z,i)
-//! I_x phi'' = h sum F_y + m g h phi - sum_axles T dF_axle       dF_axle = share (K phi + C phi')/T, at most half its load
+//! I_x phi'' = h sum F_y + m g h phi - sum_axles T dF_axle/f      dF_axle = share f (K phi + C phi')/T, at most half its load
 //! th'' = w^2 (grad a_x/g - th) - 2 z w th'                      dF_pitch = m g h_p/(grad L) (th + 2 z/w th')
 //! sigma/|v| s' + s = tan(alpha)                                 load-dependent sigma
 //! ```
 //!
-//! Frames: REP-103; the roll axis lies on the ground, positive roll lifts the left side; positive pitch angle `th` is
+//! f is the share of the roll moment that shifts load (see `load_transfer`). Frames: REP-103; the roll axis lies on the ground, positive roll lifts the left side; positive pitch angle `th` is
 //! squat. Wheels: front left, front right, rear left, rear right. Not modelled: heave, unsprung masses, aligning
 //! moments, toe and Ackermann geometry (both front wheels turn alike).
 //!
 //! One step is the explicit midpoint rule; wheel spin takes a linearly implicit half step and relaxation an exponential
 //! one, so that both stay stable at any speed.
 
-use crate::car::{CarParameters, GRAVITY_MPS2};
+use crate::car::{CarParameters, GRAVITY_MPS2, LOAD_SENSITIVITY};
 use crate::effects::Mechanisms;
 use crate::tire::{Contact, Tire, TireForce};
 
@@ -101,6 +101,7 @@ pub(crate) struct Plant {
     l_r_m: f64,
     tires: [Tire; 4],
     nominal_load_n: [f64; 4],
+    load_shift_share: f64,
     roll_stiffness_nm_per_rad: f64,
     roll_damping_nms_per_rad: f64,
     roll_inertia_kgm2: f64,
@@ -150,7 +151,7 @@ impl Plant {
             / (std::f64::consts::TAU * car.roll.frequency_hz).powi(2);
         let roll_damping_nms_per_rad =
             2.0 * car.roll.damping_ratio * std::f64::consts::TAU * car.roll.frequency_hz * roll_inertia_kgm2;
-        let sensitivity = load_sensitivity(car, mechanisms, road_friction);
+        let (load_shift_share, sensitivity) = load_transfer(car, mechanisms, road_friction);
         let tire = |parameters, load_n, side: f64| {
             let mut fitted = parameters;
             scale_tire(&mut fitted, 1.0 + side * mechanisms.tire_asymmetry);
@@ -170,13 +171,13 @@ impl Plant {
             l_f_m,
             l_r_m,
             nominal_load_n,
+            load_shift_share,
             roll_stiffness_nm_per_rad: gravity_nm * (1.0 + 1.0 / car.roll.gradient_rad_per_g),
             roll_damping_nms_per_rad,
             roll_inertia_kgm2,
             low_speed_mps: car.low_speed_mps(),
         }
     }
-
 
     /// Peak friction of an axle at rest, on a road of friction `road_friction`.
     pub(crate) fn axle_peak(&self, front: bool, road_friction: f64) -> f64 {
@@ -264,9 +265,12 @@ impl Plant {
             self.roll_stiffness_nm_per_rad * s.roll_rad + self.roll_damping_nms_per_rad * s.roll_rate_radps;
         let half = self.car.track_width_m / 2.0;
         let share = self.car.roll.front_share;
-        let front_nm = (share * spring_nm).clamp(-front_n * half, front_n * half);
-        let rear_nm = ((1.0 - share) * spring_nm).clamp(-rear_n * half, rear_n * half);
-        let (front_shift, rear_shift) = (front_nm / (2.0 * half), rear_nm / (2.0 * half));
+        // An axle carries no more roll moment than lifts its inner wheel.
+        let most = half / self.load_shift_share.max(1e-9);
+        let front_nm = (share * spring_nm).clamp(-front_n * most, front_n * most);
+        let rear_nm = ((1.0 - share) * spring_nm).clamp(-rear_n * most, rear_n * most);
+        let per_nm = self.load_shift_share / (2.0 * half);
+        let (front_shift, rear_shift) = (front_nm * per_nm, rear_nm * per_nm);
         let loads = [
             front_n / 2.0 - front_shift,
             front_n / 2.0 + front_shift,
@@ -435,9 +439,13 @@ fn scale_tire(tire: &mut crate::tire::TireParameters, factor: f64) {
     tire.grip *= factor;
 }
 
-/// Load sensitivity with which an axle loses the share k of its grip at the grip limit.
-fn load_sensitivity(car: &CarParameters, mechanisms: &Mechanisms, road_friction: f64) -> f64 {
-    let limit = road_friction * (car.tire_front.grip + car.tire_rear.grip) / 2.0;
-    let shift = (2.0 * car.h_cg_m * limit / car.track_width_m).min(1.0);
-    mechanisms.load_transfer_loss / (shift * shift)
+/// How strongly lateral load transfer acts: the share of the body's roll moment that shifts load, and the tires' load
+/// sensitivity.
+///
+/// An axle whose loads differ by the share x of its load loses `e x^2` of its grip. At its own size the car shifts what
+/// its centre of gravity says and its tires have [`LOAD_SENSITIVITY`]; for another loss k at the limit both are scaled by
+/// the cube root of the ratio, so that the effect vanishes smoothly.
+fn load_transfer(car: &CarParameters, mechanisms: &Mechanisms, road_friction: f64) -> (f64, f64) {
+    let size = (mechanisms.load_transfer_loss / car.own_load_transfer_loss(road_friction)).cbrt();
+    (size, LOAD_SENSITIVITY * size)
 }

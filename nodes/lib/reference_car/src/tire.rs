@@ -1,10 +1,10 @@
-//! Brush tire with load-dependent stiffness and friction, and friction that falls once the patch slides.
+//! Brush tire with elliptic contact pressure, load-dependent stiffness and friction, and friction that falls with sliding.
 //!
 //! ```text
 //! linear forces   l_x = C_x s_x,  l_y = C_y s_y,   s_x = kappa/(1+kappa),  s_y = tan(alpha)/(1 + k kappa)
-//! saturation      psi = |(l_x, l_y)| / (3 n mu F_z)
-//! force           F   = n mu F_z g(psi) (l_x, l_y)/|(l_x, l_y)|
-//! shape           g   = p(min(psi, 1)) (1 - (1 - q) psi^2/(psi^2 + psi_s^2)),   p = 3 psi - 3 psi^2 + psi^3
+//! saturation      s   = (pi/4) |(l_x, l_y)| / (n mu F_z)
+//! force           F   = n mu F_z g(s) (l_x, l_y)/|(l_x, l_y)|
+//! shape           g   = 2/pi (atan s + s/(1 + s^2)) (1 - (1 - q) s^2/(s^2 + s_s^2))
 //! load            C   = c F_z (1 - e_c (F_z/F_z0 - 1)),   mu = mu_road grip (1 - e (F_z/F_z0 - 1))
 //! ```
 //!
@@ -13,13 +13,17 @@
 //! | kappa, alpha | longitudinal slip, slip angle (positive gives a force to the left) | -, rad |
 //! | c | stiffness over load | 1/rad, 1 |
 //! | mu | peak friction at this load; n makes the peak of g equal one | - |
-//! | q, psi_s | sliding friction over the peak's, and where the fall happens | - |
+//! | q, s_s | sliding friction over the peak's, and where the fall happens | - |
 //! | e, e_c | load sensitivity of friction and of stiffness | - |
 //! | k | coupling of the two directions: 0 none, 1 the whole brush | - |
 //!
-//! p is the brush with parabolic pressure (Pacejka, Tire and Vehicle Dynamics, 3rd ed., section 3.2);
-//! the fall of friction is a rational stand-in for the sliding-speed dependence discussed there in 3.3.
+//! The first factor of g is the exact force of bristles whose stress grows linearly from the leading edge and is cut off
+//! by friction under Hertz's elliptic pressure `p = p_0 sqrt(1 - x^2)`: they stick up to `x = (1 - s^2)/(1 + s^2)`.
+//! (The parabolic pressure of the textbook brush gives a force with a `|alpha| alpha` term instead.) The second factor
+//! stands in for friction that falls with the sliding speed.
 //! Not implemented: aligning moment on the body, turn slip, width of the contact patch.
+
+use std::f64::consts::{FRAC_2_PI, FRAC_PI_4};
 
 use serde::{Deserialize, Serialize};
 
@@ -36,8 +40,8 @@ pub struct TireParameters {
     pub sliding_share: f64,
 }
 
-/// Where the fall of friction is half done, in units of the slip at which the whole patch slides.
-const FALL_SLIP: f64 = 1.6;
+/// Where the fall of friction is half done, in units of s.
+const FALL_SLIP: f64 = 2.0;
 /// Smallest share of the nominal friction or stiffness that load sensitivity leaves.
 const LEAST_LOAD_FACTOR: f64 = 0.3;
 /// Share of the friction's load sensitivity that the stiffness has.
@@ -85,9 +89,8 @@ impl Tire {
         load_sensitivity: f64,
         coupling: f64,
     ) -> Self {
-        let peak = (1..400)
-            .map(|i| shape(f64::from(i) * 0.005, parameters.sliding_share))
-            .fold(f64::MIN_POSITIVE, f64::max);
+        let peak =
+            (1..1000).map(|i| shape(f64::from(i) * 0.01, parameters.sliding_share)).fold(0.0, f64::max);
         Self { parameters, nominal_load_n, load_sensitivity, coupling, peak_scale: 1.0 / peak }
     }
 
@@ -123,8 +126,8 @@ impl Tire {
     /// Share of a linear force that the patch transmits while `other` acts across it.
     fn transmitted(&self, own: f64, other: f64, limit_n: f64) -> f64 {
         let total = (own * own + other * other).sqrt();
-        let psi = total / (3.0 * limit_n);
-        if psi < 1e-9 { 1.0 } else { shape(psi, self.parameters.sliding_share) / (3.0 * psi) }
+        let slip = FRAC_PI_4 * total / limit_n;
+        if slip < 1e-9 { 1.0 } else { FRAC_PI_4 * shape(slip, self.parameters.sliding_share) / slip }
     }
 
     fn load_factor(&self, load_n: f64, sensitivity: f64) -> f64 {
@@ -136,10 +139,9 @@ impl Tire {
     }
 }
 
-/// g(psi) of the module's equations before its peak is scaled to one.
-fn shape(psi: f64, sliding_share: f64) -> f64 {
-    let inner = psi.min(1.0);
-    let brush = inner * (3.0 + inner * (inner - 3.0));
-    let squared = psi * psi;
+/// g(s) of the module's equations before its peak is scaled to one.
+fn shape(slip: f64, sliding_share: f64) -> f64 {
+    let squared = slip * slip;
+    let brush = FRAC_2_PI * (slip.atan() + slip / (1.0 + squared));
     brush * (1.0 - (1.0 - sliding_share) * squared / (squared + FALL_SLIP * FALL_SLIP))
 }

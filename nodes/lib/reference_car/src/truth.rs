@@ -10,7 +10,7 @@ const WHEELS: [&str; 4] = ["fl", "fr", "rl", "rr"];
 /// The column names of the truth table, in order.
 pub fn truth_columns() -> Vec<String> {
     let mut names: Vec<String> = [
-        "time_s",
+        "stamp_s",
         "x_m",
         "y_m",
         "heading_rad",
