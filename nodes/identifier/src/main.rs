@@ -1,3 +1,10 @@
-//! Node: residual models and a friction prior to Pacejka parameters.
+//! Node: residual models and a friction prior to Pacejka parameters. See the README beside this folder.
 
-fn main() {}
+mod diagnostics;
+mod node;
+mod outputs;
+mod run;
+
+fn main() -> anyhow::Result<()> {
+    gripsight_runtime::run("identifier", node::setup)
+}

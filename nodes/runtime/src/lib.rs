@@ -47,6 +47,7 @@ mod qos;
 mod run;
 mod subscription;
 mod value;
+mod vehicle;
 mod yaml;
 
 pub use clock::Clock;
@@ -59,3 +60,4 @@ pub use qos::Qos;
 pub use run::run;
 pub use subscription::Subscription;
 pub use value::{ParameterType, ParameterValue};
+pub use vehicle::vehicle_parameters;

@@ -1,3 +1,9 @@
-//! Node: state sequences and a candidate to a learned residual model.
+//! Node: state sequences and a candidate to a learned residual model. See the README beside this folder.
 
-fn main() {}
+mod diagnostics;
+mod node;
+mod recent;
+
+fn main() -> anyhow::Result<()> {
+    gripsight_runtime::run("s4_residual", node::setup)
+}

@@ -1,3 +1,9 @@
-//! Node: odometry and steering to state sequences.
+//! Node: odometry and drive commands to state sequences. See the README beside this folder.
 
-fn main() {}
+mod buffer;
+mod diagnostics;
+mod node;
+
+fn main() -> anyhow::Result<()> {
+    gripsight_runtime::run("telemetry", node::setup)
+}

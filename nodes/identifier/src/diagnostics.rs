@@ -1,0 +1,88 @@
+//! The node's state in words.
+
+use gripsight_runtime::{Level, Status};
+
+/// How the last run ended.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum LastRun {
+    /// There was none yet.
+    None,
+    /// Its set was published.
+    Accepted {
+        /// What it must be read with.
+        remarks: String,
+    },
+    /// Its set must not be used.
+    Rejected {
+        /// Why.
+        reason: String,
+    },
+    /// It gave no set at all.
+    Failed {
+        /// Why.
+        reason: String,
+    },
+}
+
+/// What the state is judged by.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Facts {
+    pub(crate) last: LastRun,
+    /// Where the run under way stands, if there is one.
+    pub(crate) running: Option<String>,
+    /// Runs ended, and of them accepted.
+    pub(crate) runs: usize,
+    pub(crate) accepted: usize,
+    /// Time of the last run, s.
+    pub(crate) last_run_s: f64,
+    /// The friction prior in force, in words.
+    pub(crate) prior: String,
+    /// Sequence of the set that the MPC has.
+    pub(crate) in_force: Option<u64>,
+}
+
+/// ERROR: the last run gave no set at all. WARN: its set was rejected (the MPC keeps the one before).
+pub(crate) fn status(facts: &Facts) -> Status {
+    let (level, text) = match &facts.last {
+        LastRun::None => (Level::Ok, "waiting for the first sequence".to_owned()),
+        LastRun::Accepted { remarks } if remarks.is_empty() => (Level::Ok, "tires accepted".to_owned()),
+        LastRun::Accepted { remarks } => (Level::Ok, format!("tires accepted; {remarks}")),
+        LastRun::Rejected { reason } => (Level::Warn, format!("tires rejected: {reason}")),
+        LastRun::Failed { reason } => (Level::Error, reason.clone()),
+    };
+    let text = match &facts.running {
+        Some(running) if facts.last == LastRun::None => running.clone(),
+        Some(running) => format!("{text}; now {running}"),
+        None => text,
+    };
+    Status::new(level, text)
+        .value("runs", facts.runs)
+        .value("accepted", facts.accepted)
+        .value("last run [s]", format!("{:.2}", facts.last_run_s))
+        .value("friction prior", &facts.prior)
+        .value("sequence of the set in force", facts.in_force.map_or("none".to_owned(), |id| id.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_end_has_its_level() {
+        let of = |last| {
+            status(&Facts {
+                last,
+                running: Some("training".into()),
+                runs: 1,
+                accepted: 0,
+                last_run_s: 1.0,
+                prior: "none".into(),
+                in_force: None,
+            })
+        };
+        assert_eq!((of(LastRun::None).level, of(LastRun::None).message.as_str()), (Level::Ok, "training"));
+        assert_eq!(of(LastRun::Accepted { remarks: String::new() }).level, Level::Ok);
+        assert_eq!(of(LastRun::Rejected { reason: "r".into() }).level, Level::Warn);
+        assert_eq!(of(LastRun::Failed { reason: "r".into() }).level, Level::Error);
+    }
+}

@@ -1,0 +1,84 @@
+//! The node's publishers, and the messages that only it makes.
+
+use std::time::Duration;
+
+use gripsight_bag::{encode, identification_messages as messages};
+use gripsight_identification::{Candidate, Config, IterationRecord, Outcome, RunKey};
+use gripsight_msgs::standard::std_msgs::Header;
+use gripsight_msgs::{IdentificationProgress as Progress, PacejkaParams};
+use gripsight_runtime::{Node, Publisher, Qos};
+use gripsight_signals::StateSequence;
+use gripsight_vehicle::VehicleParameters;
+
+/// Where results go.
+pub(crate) struct Outputs {
+    candidate: Publisher<PacejkaParams>,
+    pacejka: Publisher<PacejkaParams>,
+    progress: Publisher<Progress>,
+}
+
+impl Outputs {
+    pub(crate) fn new(node: &mut Node) -> Result<Self, gripsight_runtime::Error> {
+        Ok(Self {
+            candidate: node.publisher("~/candidate", Qos::latched())?,
+            pacejka: node.publisher("~/pacejka", Qos::latched())?,
+            progress: node.publisher("~/progress", Qos::latched())?,
+        })
+    }
+
+    /// Asks for the residual model of a candidate.
+    pub(crate) async fn propose(
+        &self,
+        candidate: &Candidate,
+        vehicle: &VehicleParameters,
+        sequence: &StateSequence,
+    ) {
+        let message = PacejkaParams { header: header(sequence), ..messages::proposed(candidate, vehicle) };
+        self.candidate.publish(&message).await;
+    }
+
+    /// Publishes the end of a run: an accepted set goes to the MPC, a rejected one does not.
+    pub(crate) async fn conclude(&self, outcome: &Outcome, sequence: &StateSequence) {
+        let message = PacejkaParams { header: header(sequence), ..messages::result(outcome) };
+        self.candidate.publish(&message).await;
+        if outcome.accepted {
+            self.pacejka.publish(&message).await;
+        }
+    }
+
+    /// Says where a run stands.
+    pub(crate) async fn progress(&self, step: &Step<'_>) {
+        let last = step.last;
+        let message = Progress {
+            header: header(step.sequence),
+            handshake: messages::handshake(step.key),
+            stage: step.stage,
+            max_iterations: step.config.max_iterations,
+            change: last.map_or(f64::NAN, |i| i.change),
+            tolerance: step.config.tolerance,
+            cost: last.map_or(f64::NAN, |i| i.fit_rmse),
+            extrapolated_share: last.map_or(f64::NAN, |i| i.extrapolated_share),
+            elapsed_s: step.elapsed.as_secs_f64(),
+            text: step.text.clone(),
+        };
+        self.progress.publish(&message).await;
+    }
+}
+
+/// Where a run stands.
+pub(crate) struct Step<'a> {
+    pub(crate) key: &'a RunKey,
+    pub(crate) sequence: &'a StateSequence,
+    pub(crate) config: &'a Config,
+    /// One of the message's stages.
+    pub(crate) stage: u8,
+    pub(crate) last: Option<&'a IterationRecord>,
+    pub(crate) elapsed: Duration,
+    pub(crate) text: String,
+}
+
+/// The results of a sequence are stamped with its last sample.
+fn header(sequence: &StateSequence) -> Header {
+    let last_ns = sequence.start_stamp_ns + (sequence.duration_s() * 1e9).round() as i64;
+    Header { stamp: encode::time(last_ns), frame_id: String::new() }
+}

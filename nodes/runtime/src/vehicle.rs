@@ -1,0 +1,54 @@
+//! The `vehicle` block that the nodes share: the same parameter file as the offline command's `--vehicle`.
+
+use gripsight_vehicle::{VehicleError, VehicleParameters};
+
+use crate::{Descriptor, Error, Node};
+
+/// Declares the parameters `vehicle.*` and gives the car that they describe. They are read-only: another car means another run.
+///
+/// # Errors
+/// [`Error::Parameter`] for the first that is missing or out of range: there is no default car, since a wrong one gives wrong tires.
+pub fn vehicle_parameters(node: &mut Node) -> Result<VehicleParameters, Error> {
+    let mut number = |name: &str, default: f64, meaning: &str| {
+        node.parameter(&format!("vehicle.{name}"), default, Descriptor::new(meaning).read_only())
+            .map(|p| p.get())
+    };
+    let known = VehicleParameters::f1tenth();
+    let vehicle = VehicleParameters {
+        mass_kg: number("mass_kg", 0.0, "Mass [kg]; required")?,
+        yaw_inertia_kgm2: number("yaw_inertia_kgm2", 0.0, "Yaw inertia [kg m2]; required")?,
+        l_f_m: number("l_f_m", 0.0, "Centre of gravity to front axle [m]; required")?,
+        l_r_m: number("l_r_m", 0.0, "Centre of gravity to rear axle [m]; required")?,
+        h_cg_m: number("h_cg_m", 0.0, "Height of the centre of gravity [m]")?,
+        drive_front_share: number(
+            "drive_front_share",
+            known.drive_front_share,
+            "Share of the drive force at the front axle [-]",
+        )?,
+        brake_front_share: number(
+            "brake_front_share",
+            known.brake_front_share,
+            "Share of the brake force at the front axle [-]",
+        )?,
+        max_steering_rad: number(
+            "max_steering_rad",
+            known.max_steering_rad,
+            "Largest road-wheel angle [rad]",
+        )?,
+        wheel_radius_m: Some(number("wheel_radius_m", 0.0, "Radius of the driven wheels [m]; 0: not known")?)
+            .filter(|&r| r != 0.0),
+        name: None,
+    };
+    let name = node.parameter(
+        "vehicle.name",
+        String::new(),
+        Descriptor::new("Names the files that are written").read_only(),
+    )?;
+    let vehicle = VehicleParameters { name: Some(name.get()).filter(|n| !n.is_empty()), ..vehicle };
+    vehicle.checked().map_err(|error| match error {
+        VehicleError::Parameter { name, got, must } => {
+            Error::parameter(&format!("vehicle.{name}"), format!("it is {got}, must be {must}"))
+        }
+        other => Error::parameter("vehicle", other.to_string()),
+    })
+}

@@ -1,0 +1,140 @@
+//! What the node holds: the streams on their way to a window. No ROS, no clock.
+
+use gripsight_signals::{
+    AlignConfig, Aligner, Measurement, SignalError, StateSequence, WindowConfig, WindowCutter,
+};
+
+/// A stamp that goes back further than this means that the clock was set back (a bag started again); less is one late message.
+const CLOCK_JUMP_S: f64 = 1.0;
+
+/// Counts for the diagnostics.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Counts {
+    /// Messages by stream: odometry, drive, inertial unit, wheels.
+    pub(crate) taken: [usize; 4],
+    /// Messages left out: not finite, late, or with the stamp of the one before.
+    pub(crate) rejected: usize,
+    /// Odometry left out because no drive command was in force.
+    pub(crate) without_drive: usize,
+    /// Times that the clock jumped back.
+    pub(crate) clock_jumps: usize,
+    /// Sequences given out.
+    pub(crate) sequences: usize,
+}
+
+/// Aligns the streams and cuts windows, by the rules that the offline command follows.
+pub(crate) struct Buffer {
+    window: WindowConfig,
+    aligner: Aligner,
+    cutter: WindowCutter,
+    late_or_bad: usize,
+    earlier: Counts,
+    /// What was wrong with the last message that was left out.
+    pub(crate) last_problem: Option<String>,
+}
+
+impl Buffer {
+    pub(crate) fn new(window: WindowConfig) -> Result<Self, SignalError> {
+        Ok(Self {
+            window,
+            aligner: Aligner::new(AlignConfig::default()),
+            cutter: WindowCutter::new(window)?,
+            late_or_bad: 0,
+            earlier: Counts::default(),
+            last_problem: None,
+        })
+    }
+
+    /// Takes a message; gives the windows that it closes.
+    pub(crate) fn push(&mut self, message: Measurement) -> Vec<StateSequence> {
+        if let Err(error) = self.aligner.push(message) {
+            self.last_problem = Some(error.to_string());
+            match error {
+                SignalError::StampWentBack { back_s, .. } if back_s > CLOCK_JUMP_S => {
+                    tracing::warn!("the clock jumped back by {back_s:.3} s: starting over");
+                    self.start_over();
+                    return self.push(message);
+                }
+                _ => self.late_or_bad += 1,
+            }
+            return Vec::new();
+        }
+        let mut closed = Vec::new();
+        while let Some(sample) = self.aligner.poll() {
+            closed.extend(self.cutter.push(sample));
+        }
+        self.earlier.sequences += closed.len();
+        closed
+    }
+
+    /// Samples in the window still open, and how long it is to be.
+    pub(crate) fn filling(&self) -> (usize, f64) {
+        (self.cutter.buffered(), self.window.length_s)
+    }
+
+    pub(crate) fn counts(&self) -> Counts {
+        let taken = self.aligner.counts();
+        Counts {
+            taken: std::array::from_fn(|i| self.earlier.taken[i] + taken[i]),
+            rejected: self.earlier.rejected + self.late_or_bad + self.aligner.duplicates(),
+            without_drive: self.earlier.without_drive + self.aligner.without_drive(),
+            ..self.earlier
+        }
+    }
+
+    /// Nothing from before a jump may be mixed with what comes after.
+    fn start_over(&mut self) {
+        self.earlier = Counts { clock_jumps: self.earlier.clock_jumps + 1, ..self.counts() };
+        self.late_or_bad = 0;
+        self.aligner = Aligner::new(AlignConfig::default());
+        self.cutter.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gripsight_signals::{DriveSample, OdometrySample};
+
+    fn second(buffer: &mut Buffer, from_ms: i64) -> Vec<StateSequence> {
+        (0..100)
+            .flat_map(|k| {
+                let stamp_ns = (from_ms + 10 * k) * 1_000_000;
+                let mut out = buffer.push(Measurement::Drive(DriveSample { stamp_ns, ..Default::default() }));
+                out.extend(buffer.push(Measurement::Odometry(OdometrySample {
+                    stamp_ns,
+                    v_x_mps: 1.0,
+                    ..Default::default()
+                })));
+                out
+            })
+            .collect()
+    }
+
+    fn buffer() -> Buffer {
+        Buffer::new(WindowConfig { length_s: 1.5, hop_s: 1.5 }).unwrap()
+    }
+
+    #[test]
+    fn a_clock_that_jumps_back_clears_the_window() {
+        let mut buffer = buffer();
+        assert!(second(&mut buffer, 10_000).is_empty());
+        assert!(second(&mut buffer, 1_000).is_empty());
+        let window = second(&mut buffer, 2_000).remove(0);
+        assert_eq!(window.start_stamp_ns, 1_000_000_000);
+        let counts = buffer.counts();
+        assert_eq!((counts.clock_jumps, counts.taken[0], counts.sequences), (1, 300, 1));
+    }
+
+    #[test]
+    fn a_late_or_broken_message_is_counted_and_left_out() {
+        let mut buffer = buffer();
+        second(&mut buffer, 10_000);
+        for (stamp_ns, v_x_mps) in [(10_500_000_000, 1.0), (11_000_000_000, f64::NAN)] {
+            buffer.push(Measurement::Odometry(OdometrySample { stamp_ns, v_x_mps, ..Default::default() }));
+        }
+        assert_eq!(second(&mut buffer, 11_000).len(), 1);
+        assert_eq!((buffer.counts().rejected, buffer.counts().clock_jumps), (2, 0));
+        assert!(buffer.last_problem.unwrap().contains("v_x_mps is NaN"));
+    }
+}
