@@ -6,6 +6,7 @@
 //! - [`decode`], [`encode`]: messages and samples; [`sequence_to_messages`], [`Reassembler`]: sequences in chunks.
 //! - [`identification_messages`]: candidates, residual models and outcomes.
 //! - [`BagWriter`], [`recover`]: writing bags, and rewriting what is left of a damaged one.
+//! - [`info`]: what is in a bag; [`inject`]: a recorded bag with a known [`effect`].
 //! - [`from_cdr`], [`to_cdr`]: messages and bytes.
 //!
 //! A bag is an `.mcap` file or a rosbag2 folder; its memory is bounded by one chunk, and no length in it is trusted.
@@ -13,9 +14,12 @@
 mod bag;
 mod cdr;
 pub mod decode;
+pub mod effect;
 pub mod encode;
 mod error;
 pub mod identification_messages;
+mod info;
+mod inject;
 mod records;
 mod recover;
 mod rosbag2;
@@ -27,6 +31,8 @@ mod writer;
 pub use bag::{Bag, Messages, RawMessage, Topic};
 pub use cdr::{from_cdr, to_cdr};
 pub use error::BagError;
+pub use info::{BagInfo, TopicInfo, info};
+pub use inject::inject;
 pub use recover::{Recovered, recover};
 pub use sequence::{
     MESSAGE_LIMIT_BYTES, Reassembler, RecordedSequence, read_recorded_sequences, sequence_to_messages,

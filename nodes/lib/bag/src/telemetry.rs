@@ -79,13 +79,20 @@ pub fn read_sequences(
     topics: &TopicMap,
     window: WindowConfig,
 ) -> Result<(Vec<StateSequence>, ReadReport), BagError> {
-    let bag = Bag::open(path)?;
-    if let Some(topic) = topics.resolve_sequence(&bag)? {
-        let (recorded, truncated) = read_recorded(&bag, &topic)?;
+    sequences_of(&Bag::open(path)?, topics, window)
+}
+
+pub(crate) fn sequences_of(
+    bag: &Bag,
+    topics: &TopicMap,
+    window: WindowConfig,
+) -> Result<(Vec<StateSequence>, ReadReport), BagError> {
+    if let Some(topic) = topics.resolve_sequence(bag)? {
+        let (recorded, truncated) = read_recorded(bag, &topic)?;
         let report = ReadReport { truncated, recorded_sequences: Some(topic), ..ReadReport::default() };
         return Ok((recorded.into_iter().map(|r| r.sequence).collect(), report));
     }
-    let (measurements, mut report) = measurements_of(&bag, topics)?;
+    let (measurements, mut report) = measurements_of(bag, topics)?;
     let mut aligner = Aligner::new(AlignConfig::default());
     let mut cutter = WindowCutter::new(window)?;
     let mut sequences = Vec::new();

@@ -3,9 +3,8 @@
 use std::path::PathBuf;
 
 use gripsight_bag::{TopicMap, read_sequences};
-use gripsight_signals::WindowConfig;
 
-const WHOLE: WindowConfig = WindowConfig { length_s: f64::INFINITY, hop_s: f64::INFINITY };
+use crate::support::WHOLE;
 
 /// The bag's file, or `None` with a line that says so where the data are not at hand.
 fn recorded(name: &str) -> Option<PathBuf> {

@@ -1,0 +1,126 @@
+//! State sequences over messages, in chunks, and out of bags.
+
+use gripsight_bag::{
+    BagError, BagWriter, MESSAGE_LIMIT_BYTES, Reassembler, TopicMap, read_recorded_sequences, read_sequences,
+    sequence_to_messages, to_cdr,
+};
+use gripsight_msgs::Handshake;
+use gripsight_signals::{StateSequence, WindowConfig};
+use proptest::prelude::*;
+use tempfile::TempDir;
+
+use crate::support::{START_NS, WHOLE, telemetry_bag};
+
+/// A sequence of `len` samples with every channel its own, some of them not recorded.
+fn sequence(len: usize, recorded: bool) -> StateSequence {
+    let channel =
+        |c: u32| (0..len).map(|k| f32::from_bits(0x3f00_0000 + c * 0x1_0000 + k as u32)).collect::<Vec<_>>();
+    let optional = |c| if recorded { channel(c) } else { Vec::new() };
+    StateSequence {
+        sequence_id: 77,
+        start_stamp_ns: START_NS + 1,
+        time_s: (0..len).map(|k| k as f32 * 0.01).collect(),
+        v_x_mps: channel(1),
+        v_y_mps: channel(2),
+        yaw_rate_radps: channel(3),
+        steering_rad: channel(4),
+        x_m: optional(5),
+        y_m: optional(6),
+        yaw_rad: optional(7),
+        a_x_mps2: optional(8),
+        a_y_mps2: optional(9),
+        gyro_yaw_rate_radps: optional(10),
+        command_speed_mps: channel(11),
+        command_acceleration_mps2: optional(12),
+        wheel_speed: [13, 14, 15, 16].map(optional),
+        wheel_effort_nm: [17, 18].map(optional),
+    }
+}
+
+fn handshake() -> Handshake {
+    Handshake { run_id: "run".to_owned(), vehicle_hash: "f".repeat(64), seed: 3, ..Handshake::default() }
+}
+
+#[test]
+fn no_message_is_over_the_limit_and_chunks_are_few() {
+    for (recorded, len, chunks) in [(true, 3000, 2), (false, 3000, 1), (true, 60_000, 31), (false, 2, 1)] {
+        let messages = sequence_to_messages(&sequence(len, recorded), &handshake(), "map");
+        let longest = messages.iter().map(|m| to_cdr(m).unwrap().len()).max().unwrap();
+        assert!(longest <= MESSAGE_LIMIT_BYTES, "{longest}");
+        assert_eq!(messages.len(), chunks);
+    }
+}
+
+#[test]
+fn parts_that_do_not_fit_are_refused() {
+    let [first, ..] = &sequence_to_messages(&sequence(5000, true), &handshake(), "map")[..] else { panic!() };
+    let mut reassembler = Reassembler::default();
+    for (chunk, chunks) in [(3, 3), (0, 0)] {
+        let message = gripsight_msgs::StateSequence { chunk, chunks, ..first.clone() };
+        assert!(matches!(reassembler.push(message), Err(BagError::Chunk { sequence_id: 77, .. })));
+    }
+    let mut uneven = gripsight_msgs::StateSequence { chunks: 1, ..first.clone() };
+    uneven.v_y_mps.pop();
+    assert!(matches!(reassembler.push(uneven), Err(BagError::Samples(_))));
+}
+
+proptest! {
+    /// Repeated, late and mixed parts give each sequence once and exactly.
+    #[test]
+    fn parts_in_any_order(order in Just((0..9usize).collect::<Vec<_>>()).prop_shuffle(), repeats in prop::collection::vec(0..9usize, 0..20)) {
+        let [a, b] = [1, 2].map(|id| StateSequence { sequence_id: id, ..sequence(6000 + id as usize, true) });
+        let mut parts: Vec<_> = [&a, &b].iter().flat_map(|s| sequence_to_messages(s, &handshake(), "map")).collect();
+        prop_assert_eq!(parts.len(), 8);
+        parts.push(parts[2].clone());
+        let mut reassembler = Reassembler::default();
+        let mut whole = Vec::new();
+        for k in order.into_iter().chain(repeats) {
+            whole.extend(reassembler.push(parts[k].clone()).unwrap());
+        }
+        whole.sort_by_key(|r| r.sequence.sequence_id);
+        let sequences: Vec<_> = whole.iter().map(|r| r.sequence.clone()).collect();
+        prop_assert_eq!(sequences, vec![a, b]);
+        prop_assert_eq!(&whole[0].handshake.run_id, "run");
+    }
+}
+
+#[test]
+fn lost_parts_are_forgotten_and_a_cleared_reassembler_starts_afresh() {
+    let parts = |id| {
+        sequence_to_messages(&StateSequence { sequence_id: id, ..sequence(4000, true) }, &handshake(), "map")
+    };
+    let mut reassembler = Reassembler::default();
+    for id in 0..100 {
+        assert_eq!(reassembler.push(parts(id)[0].clone()).unwrap(), None);
+    }
+    let mut complete = |id: u64| parts(id).into_iter().filter_map(|p| reassembler.push(p).unwrap()).count();
+    assert_eq!((complete(99), complete(99), complete(0)), (1, 0, 1));
+    reassembler.clear();
+    let whole = parts(99).into_iter().filter_map(|p| reassembler.push(p).unwrap()).count();
+    assert_eq!(whole, 1);
+}
+
+#[test]
+fn recorded_sequences_come_back_bit_for_bit() {
+    let folder = TempDir::new().unwrap();
+    let raw = telemetry_bag(&folder.path().join("raw.mcap"), 1000);
+    let window = WindowConfig { length_s: 4.0, hop_s: 2.0 };
+    let (cut, _) = read_sequences(&raw, &TopicMap::default(), window).unwrap();
+    assert_eq!(cut.len(), 3, "full windows only");
+    let path = folder.path().join("recorded.mcap");
+    let mut writer = BagWriter::create(&path).unwrap();
+    for sequence in &cut {
+        for part in sequence_to_messages(sequence, &handshake(), "map") {
+            writer.write("/telemetry/sequence", sequence.start_stamp_ns, &part).unwrap();
+        }
+    }
+    writer.finish().unwrap();
+    let (back, report) = read_sequences(&path, &TopicMap::default(), WHOLE).unwrap();
+    assert_eq!(back, cut);
+    assert_eq!(report.recorded_sequences.as_deref(), Some("/telemetry/sequence"));
+    let bag = gripsight_bag::Bag::open(&path).unwrap();
+    let recorded = read_recorded_sequences(&bag, &TopicMap::default()).unwrap();
+    assert!(
+        recorded.iter().all(|r| r.handshake.seed == 3 && r.handshake.sequence_id == r.sequence.sequence_id)
+    );
+}
