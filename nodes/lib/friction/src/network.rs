@@ -1,6 +1,7 @@
 //! The network: a tensor in, one logit per road state out.
 
 use std::path::Path;
+use std::sync::Mutex;
 
 use ort::environment::Environment;
 use ort::session::Session;
@@ -31,17 +32,25 @@ impl OnnxRuntime {
     /// # Errors
     /// [`FrictionError::Library`] or [`FrictionError::Model`].
     pub fn load(library: &Path, model: &Path) -> Result<Self, FrictionError> {
-        // `ort::init` panics where the library is missing; `init_from` tells.
-        let unusable = |message: String| FrictionError::Library { path: library.to_path_buf(), message };
-        let environment = ort::init_from(library)
-            .map_err(|e| unusable(e.to_string()))?
-            .with_telemetry(false)
-            .build()
-            .map_err(|e| unusable(e.to_string()))?;
+        let environment = environment(library)
+            .map_err(|message| FrictionError::Library { path: library.to_path_buf(), message })?;
         let session = open(&environment, model)
             .map_err(|message| FrictionError::Model { path: model.to_path_buf(), message })?;
         Ok(Self { session })
     }
+}
+
+/// ONNX Runtime allows one environment per process, so it is kept.
+fn environment(library: &Path) -> Result<Environment, String> {
+    static KEPT: Mutex<Option<Environment>> = Mutex::new(None);
+    let mut kept = KEPT.lock().map_err(|e| e.to_string())?;
+    if let Some(environment) = &*kept {
+        return Ok(environment.clone());
+    }
+    // `ort::init` panics where the library is missing; `init_from` tells.
+    let builder = ort::init_from(library).map_err(|e| e.to_string())?;
+    let environment = builder.with_telemetry(false).build().map_err(|e| e.to_string())?;
+    Ok(kept.insert(environment).clone())
 }
 
 fn open(environment: &Environment, model: &Path) -> Result<Session, String> {

@@ -1,0 +1,63 @@
+"""Trained weights to ONNX, and the golden files that tie the Rust pipeline to this one.
+
+    python export.py --weights OUT/last.pt --backbone mobilenet_v3_small --out ../model/road_mobilenet_v3_small.onnx
+    python export.py ... --golden ../../lib/friction/tests/golden
+"""
+
+import argparse
+import json
+import warnings
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+from PIL import Image
+
+from data import to_tensor
+from model import build
+from noise import Bank
+from render import render
+
+GOLDEN_SEED, GOLDEN_SIZE, GOLDEN_CROP = 20, 400, (40, 120, 360, 380)
+
+
+def golden(net, folder):
+    """A made picture (road.png), its region of interest as PIL resizes it (input.png), tensor samples and logits."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    f = np.array([0.45, 0.0, 0.0, 0.55, 0.0])
+    picture, fractions = render(np.random.default_rng(GOLDEN_SEED), Bank(GOLDEN_SEED, per_beta=4), GOLDEN_SIZE, None, f)
+    resized = np.asarray(Image.fromarray(picture).crop(GOLDEN_CROP).resize((224, 224), Image.BILINEAR))
+    cv2.imwrite(str(folder / "road.png"), picture[:, :, ::-1])
+    cv2.imwrite(str(folder / "input.png"), resized[:, :, ::-1])
+    tensor = to_tensor(resized)
+    with torch.no_grad():
+        logits = net(tensor[None])[0]
+    at = list(range(0, tensor.numel(), 1511))
+    (folder / "golden.json").write_text(json.dumps({
+        "generator": f"training/export.py, torch {torch.__version__}, numpy {np.__version__}, PIL {Image.__version__}",
+        "size": GOLDEN_SIZE, "crop": GOLDEN_CROP, "fractions": fractions.tolist(), "tensor_at": at,
+        "tensor": tensor.flatten()[at].tolist(), "logits": logits.tolist()}, indent=1) + "\n")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--weights", required=True)
+    parser.add_argument("--backbone", default="mobilenet_v3_small")
+    parser.add_argument("--out", required=True)
+    parser.add_argument("--golden", help="folder for the golden picture, tensor and logits")
+    args = parser.parse_args()
+    net = build(args.backbone)
+    net.load_state_dict(torch.load(args.weights, map_location="cpu", weights_only=True))
+    net.eval()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        torch.onnx.export(net, torch.zeros(1, 3, 224, 224), args.out, dynamo=False, opset_version=17,
+                          input_names=["picture"], output_names=["logits"])
+    if args.golden:
+        golden(net, args.golden)
+
+
+if __name__ == "__main__":
+    main()

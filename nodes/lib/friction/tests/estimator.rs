@@ -1,0 +1,124 @@
+//! The gates in their order, with a network that says what the test wants.
+
+use gripsight_friction::{
+    Basis, Estimate, Frame, FrameData, FrictionError, FrictionEstimator, Motion, Network, RawPicture, Reason,
+    Settings, Source,
+};
+
+/// Answers with fixed logits.
+struct Says(Vec<f32>);
+
+impl Network for Says {
+    fn logits(&mut self, _: &[f32]) -> Result<Vec<f32>, FrictionError> {
+        Ok(self.0.clone())
+    }
+}
+
+const WET: [f32; 5] = [0.0, 9.0, 0.0, 0.0, 0.0];
+
+fn estimator(logits: &[f32]) -> FrictionEstimator {
+    FrictionEstimator::new(
+        Settings::default(),
+        Basis::builtin().unwrap(),
+        Some(Box::new(Says(logits.to_vec()))),
+    )
+}
+
+/// A textured grey picture of 64 x 64; `seed` changes its pixels.
+fn textured(seed: u32) -> Vec<u8> {
+    let grain = |i: u32| (i.wrapping_mul(2_654_435_761).wrapping_add(seed.wrapping_mul(97)) >> 16) % 60;
+    (0..64 * 64 * 3u32).map(|i| 90 + grain(i / 3 / 7) as u8).collect()
+}
+
+fn raw(data: &[u8]) -> FrameData<'_> {
+    FrameData::Raw(RawPicture { width: 64, height: 64, step: 192, encoding: "rgb8", big_endian: false, data })
+}
+
+fn at(
+    estimator: &mut FrictionEstimator,
+    stamp_ms: i64,
+    data: FrameData<'_>,
+    distance_m: Option<f64>,
+) -> Estimate {
+    let stamp_ns = stamp_ms * 1_000_000;
+    estimator.update(&Frame { stamp_ns, data }, stamp_ns + 5_000_000, &Motion { distance_m })
+}
+
+/// Every refusal looks the same: the uninformative prior, a uniform p, and no pictures.
+fn assert_refused(got: &Estimate, reason: Reason) {
+    let wide = Basis::builtin().unwrap().uninformative;
+    assert_eq!(got.reason, Some(reason), "{got:?}");
+    assert!(!got.valid());
+    assert_eq!((got.mu, got.sigma, got.pictures), (wide.mu, wide.sigma, 0));
+    assert!(got.probability.iter().all(|p| (p - 0.2).abs() < 1e-12));
+}
+
+#[test]
+fn a_good_picture_gives_the_networks_answer() {
+    let got = at(&mut estimator(&WET), 0, raw(&textured(1)), None);
+    assert!(got.valid(), "{got:?}");
+    assert_eq!(got.source, Source::Camera);
+    assert!((got.mu - 0.6).abs() < 0.01 && (got.sigma - 0.1).abs() < 0.02, "{got:?}");
+    assert_eq!(got.pictures, 1);
+}
+
+#[test]
+fn without_a_network_the_configured_prior_stands() {
+    let mut blind = FrictionEstimator::new(Settings::default(), Basis::builtin().unwrap(), None);
+    let configured = Settings::default().configured;
+    for got in [blind.without_picture(), at(&mut blind, 0, raw(&textured(1)), None)] {
+        assert_eq!((got.source, got.mu, got.sigma), (Source::Configured, configured.mu, configured.sigma));
+        assert!(got.valid());
+    }
+}
+
+#[test]
+fn bad_pictures_are_refused_with_their_reason() {
+    let mut e = estimator(&WET);
+    assert_refused(&e.without_picture(), Reason::NoPicture);
+    assert_refused(&at(&mut e, 0, FrameData::Compressed(b"\xFF\xD8\xFFnot much"), None), Reason::Undecodable);
+    assert_refused(&at(&mut e, 1, raw(&vec![2; 64 * 64 * 3]), None), Reason::Dark);
+    assert_refused(&at(&mut e, 2, raw(&vec![255; 64 * 64 * 3]), None), Reason::Saturated);
+    assert_refused(&at(&mut e, 3, raw(&vec![120; 64 * 64 * 3]), None), Reason::Blurred);
+    assert_refused(&at(&mut e, 4, raw(&textured(1)[..100]), None), Reason::BadLayout);
+    let data = textured(1);
+    let named =
+        RawPicture { width: 64, height: 64, step: 192, encoding: "h264", big_endian: false, data: &data };
+    let got = at(&mut e, 5, FrameData::Raw(named), None);
+    assert_refused(&got, Reason::UnknownEncoding);
+    assert!(got.detail.unwrap().contains("h264"));
+}
+
+#[test]
+fn a_network_in_doubt_is_not_believed() {
+    assert_refused(&at(&mut estimator(&[8.0; 5]), 0, raw(&textured(1)), None), Reason::Undecided);
+    assert_refused(
+        &at(&mut estimator(&[-20.0, -11.0, -20.0, -20.0, -20.0]), 0, raw(&textured(1)), None),
+        Reason::Unfamiliar,
+    );
+    assert_refused(&at(&mut estimator(&[1.0; 4]), 0, raw(&textured(1)), None), Reason::NetworkFailed);
+    let nan = [f32::NAN, 0.0, 0.0, 0.0, 0.0];
+    assert_refused(&at(&mut estimator(&nan), 0, raw(&textured(1)), None), Reason::NetworkFailed);
+}
+
+#[test]
+fn a_frozen_camera_is_noticed_while_driving_and_recovers() {
+    let mut e = estimator(&WET);
+    assert!(at(&mut e, 0, raw(&textured(1)), Some(0.0)).valid());
+    assert_refused(&at(&mut e, 33, raw(&textured(1)), Some(1.0)), Reason::Frozen);
+    let back = at(&mut e, 66, raw(&textured(2)), Some(2.0));
+    assert!(back.valid());
+    assert_eq!(back.pictures, 2, "the average outlives a short gap");
+    assert_refused(&at(&mut e, 10, raw(&textured(3)), Some(2.0)), Reason::OutOfOrder);
+    e.reset();
+    assert!(at(&mut e, 10, raw(&textured(3)), Some(0.0)).valid());
+}
+
+#[test]
+fn single_pictures_do_not_colour_each_other() {
+    let mut e = estimator(&WET);
+    let data = textured(1);
+    let frame = Frame { stamp_ns: 0, data: raw(&data) };
+    let first = e.read_single(&frame);
+    assert_eq!(e.read_single(&frame), first);
+}
