@@ -1,0 +1,179 @@
+"""A CycloneDDS peer of the suite: it knows ROS 2's names and the .msg files, and nothing of the suite's code.
+
+    cyclone_peer.py subscribe TOPIC TYPE [--qos latched|reliable|sensor] [--count N] [--timeout S]
+    cyclone_peer.py publish TOPIC TYPE [--qos ...]      messages as JSON lines on standard input
+    cyclone_peer.py call SERVICE TYPE REQUEST           a service of a node under rmw_cyclonedds_cpp; REQUEST is JSON
+
+Messages are printed as JSON lines, one object each, with the field names of the .msg files; the line `ready` says that the
+endpoint stands. Exit code 1: not all messages came in time.
+"""
+
+import argparse
+import dataclasses
+import json
+import os
+import pathlib
+import sys
+import time
+import types as pytypes
+
+from cyclonedds.core import Policy, Qos
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.idl import IdlStruct
+from cyclonedds.idl import types as idl
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+
+MSGS = pathlib.Path(__file__).resolve().parents[2] / "msgs"
+PRIMITIVES = {
+    "bool": bool, "byte": idl.uint8, "uint8": idl.uint8, "int8": idl.int8, "uint16": idl.uint16, "int16": idl.int16,
+    "uint32": idl.uint32, "int32": idl.int32, "uint64": idl.uint64, "int64": idl.int64, "float32": idl.float32,
+    "float64": idl.float64, "string": str,
+}
+SERVICES = {
+    "GetParameters": ("string[] names", "ParameterValue[] values"),
+    "GetParameterTypes": ("string[] names", "uint8[] types"),
+    "SetParameters": ("Parameter[] parameters", "SetParametersResult[] results"),
+    "SetParametersAtomically": ("Parameter[] parameters", "SetParametersResult result"),
+    "ListParameters": ("string[] prefixes\nuint64 depth", "ListParametersResult result"),
+    "DescribeParameters": ("string[] names", "ParameterDescriptor[] descriptors"),
+}
+_types = {}
+
+
+def definition(package, name):
+    path = MSGS / "msg" if package == "gripsight_msgs" else MSGS / "standard" / package
+    return (path / f"{name}.msg").read_text()
+
+
+def struct(package, name, kind="msg", text=None):
+    """The IDL struct of a ROS type, under its DDS name."""
+    key = (package, name)
+    if key not in _types:
+        annotations = {}
+        for line in (text if text is not None else definition(package, name)).splitlines():
+            code = line.split("#")[0].strip()
+            if code and ("=" not in code or "<=" in code):
+                field_type, field = code.split()[:2]
+                annotations[field] = element(package, field_type)
+        body = lambda namespace: namespace.update(__annotations__=annotations)
+        dds_name = f"{package}::{kind}::dds_::{name}_"
+        _types[key] = dataclasses.dataclass(pytypes.new_class(name, (IdlStruct,), {"typename": dds_name}, body))
+    return _types[key]
+
+
+def element(package, text):
+    base, _, count = text.rstrip("]").partition("[")
+    if base in PRIMITIVES:
+        kind = PRIMITIVES[base]
+    else:
+        kind = struct(*base.split("/")) if "/" in base else struct(package, base)
+    if not text.endswith("]"):
+        return kind
+    if count.isdigit():
+        return idl.array[kind, int(count)]
+    return idl.sequence[kind, int(count[2:])] if count else idl.sequence[kind]
+
+
+def build(kind, value):
+    """A message from JSON; fields that are left out take their zero."""
+    if dataclasses.is_dataclass(kind):
+        return kind(**{name: build(part, value.get(name) if value else None) for name, part in kind.__annotations__.items()})
+    inner = getattr(kind, "__metadata__", [None])[0]
+    if isinstance(inner, idl.sequence):
+        return [build(inner.subtype, item) for item in value or []]
+    if isinstance(inner, idl.array):
+        return [build(inner.subtype, item) for item in value or [None] * inner.length]
+    if value is not None:
+        return value
+    return {bool: False, str: ""}.get(kind, 0)
+
+
+def qos(name, depth=1000):
+    best_effort = name == "sensor"
+    latched = name == "latched"
+    return Qos(
+        Policy.Reliability.BestEffort if best_effort else Policy.Reliability.Reliable(duration(seconds=1)),
+        Policy.Durability.TransientLocal if latched else Policy.Durability.Volatile,
+        Policy.History.KeepLast(1 if latched else depth),
+    )
+
+
+def show(message):
+    print(json.dumps(dataclasses.asdict(message), default=list), flush=True)
+
+
+def wait_until(condition, timeout_s):
+    end = time.monotonic() + timeout_s
+    while time.monotonic() < end:
+        if condition():
+            return True
+        time.sleep(0.01)
+    return False
+
+
+def subscribe(participant, args):
+    reader = DataReader(participant, Topic(participant, "rt" + args.topic, struct(*args.type.split("/msg/"))), qos(args.qos))
+    print("ready", flush=True)
+    received = 0
+
+    def take():
+        nonlocal received
+        for message in reader.take(N=100):
+            show(message)
+            received += 1
+        return received >= args.count
+
+    return wait_until(take, args.timeout)
+
+
+def publish(participant, args):
+    kind = struct(*args.type.split("/msg/"))
+    writer = DataWriter(participant, Topic(participant, "rt" + args.topic, kind), qos(args.qos))
+    print("ready", flush=True)
+    if not wait_until(writer.get_matched_subscriptions, args.timeout):
+        return False
+    for line in sys.stdin:
+        writer.write(build(kind, json.loads(line)))
+        time.sleep(args.period)
+    return args.qos == "sensor" or writer.wait_for_acks(duration(seconds=args.timeout))
+
+
+def call(participant, args):
+    name = args.type.split("/srv/")[1]
+    request_text, reply_text = SERVICES[name]
+    head = "uint64 guid\nint64 seq\n"  # rmw_cyclonedds_cpp puts these in front of every request and reply
+    request_type = struct("rcl_interfaces", f"{name}_Request", "srv", head + request_text)
+    reply_type = struct("rcl_interfaces", f"{name}_Response", "srv", head + reply_text)
+    reader = DataReader(participant, Topic(participant, f"rr{args.topic}Reply", reply_type), qos("reliable"))
+    writer = DataWriter(participant, Topic(participant, f"rq{args.topic}Request", request_type), qos("reliable"))
+    both = lambda: writer.get_matched_subscriptions() and reader.get_matched_publications()
+    if not wait_until(both, args.timeout):
+        return False
+    writer.write(build(request_type, {"guid": 4711, "seq": 1, **json.loads(args.request)}))
+    replies = []
+    answered = lambda: replies.extend(r for r in reader.take(N=10) if (r.guid, r.seq) == (4711, 1)) or replies
+    if not wait_until(answered, args.timeout):
+        return False
+    show(replies[0])
+    return True
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("command", choices=["subscribe", "publish", "call"])
+    parser.add_argument("topic")
+    parser.add_argument("type")
+    parser.add_argument("request", nargs="?")
+    parser.add_argument("--qos", choices=["latched", "reliable", "sensor"], default="reliable")
+    parser.add_argument("--count", type=int, default=1)
+    parser.add_argument("--period", type=float, default=0.0, help="seconds between published messages")
+    parser.add_argument("--timeout", type=float, default=20.0)
+    args = parser.parse_args()
+    work = {"subscribe": subscribe, "publish": publish, "call": call}[args.command]
+    sys.exit(0 if work(DomainParticipant(int(os.environ.get("ROS_DOMAIN_ID", 0))), args) else 1)
+
+
+main()

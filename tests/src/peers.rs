@@ -1,0 +1,117 @@
+//! DDS peers that share no code with the suite: CycloneDDS (Python) and Fast DDS (C++).
+//!
+//! Where a peer is missing its tests fail, unless `GRIPSIGHT_SKIP_PEERS=1` says that they may not count.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+use serde::de::DeserializeOwned;
+
+use crate::domain::Domain;
+use crate::process::{Process, program_folder};
+
+/// Time that anything between two processes may take.
+pub const PATIENCE: Duration = Duration::from_secs(30);
+
+/// A peer, or why it is not there.
+type Found = Result<PathBuf, String>;
+
+/// A path below the package.
+fn own(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+/// True when the peers are there. Says so when a test is skipped.
+///
+/// # Panics
+/// When a peer is missing and the tests with peers count.
+pub fn available(found: &[Found]) -> bool {
+    let missing: Vec<&str> =
+        found.iter().filter_map(|found| found.as_ref().err()).map(String::as_str).collect();
+    if missing.is_empty() {
+        return true;
+    }
+    let missing = missing.join("\n");
+    assert!(
+        std::env::var("GRIPSIGHT_SKIP_PEERS").is_ok_and(|value| value == "1"),
+        "a DDS peer is missing (launch_scripts/setup.sh installs it; GRIPSIGHT_SKIP_PEERS=1 skips):\n{missing}"
+    );
+    eprintln!("SKIPPED, a DDS peer is missing:\n{missing}");
+    false
+}
+
+/// The Python that has CycloneDDS.
+pub fn cyclone() -> Found {
+    let python = own("../.venv/bin/python");
+    let works = Command::new(&python)
+        .args(["-c", "import cyclonedds.domain"])
+        .output()
+        .is_ok_and(|output| output.status.success());
+    if works { Ok(python) } else { Err("CycloneDDS: `.venv` has no Python package `cyclonedds`".into()) }
+}
+
+/// The Fast DDS peer, built when its source is newer.
+pub fn fast_dds() -> Found {
+    let failed = |reason: String| format!("Fast DDS: {reason}");
+    let source = own("peers/fastdds_peer.cpp");
+    let program = program_folder().join("fastdds_peer");
+    // One test builds it, the others wait.
+    let lock = File::create(program.with_extension("lock")).map_err(|error| failed(error.to_string()))?;
+    lock.lock().map_err(|error| failed(error.to_string()))?;
+    let changed = |path: &Path| path.metadata().and_then(|data| data.modified()).ok();
+    if changed(&program) < changed(&source) {
+        let output = Command::new("c++")
+            .args(["-std=c++14", "-O1", "-o"])
+            .args([&program, &source])
+            .args(unpacked_without_root())
+            .args(["-lfastrtps", "-lfastcdr"])
+            .output()
+            .map_err(|error| failed(format!("no C++ compiler: {error}")))?;
+        if !output.status.success() {
+            return Err(failed(format!("does not build: {}", String::from_utf8_lossy(&output.stderr))));
+        }
+    }
+    Ok(program)
+}
+
+/// Compiler options for libraries that the set-up script unpacked below `.deps` for want of root.
+fn unpacked_without_root() -> Vec<String> {
+    let system = own("../.deps/system/usr");
+    if !system.exists() {
+        return Vec::new();
+    }
+    let include = system.join("include").display().to_string();
+    let library = system.join(format!("lib/{}-linux-gnu", std::env::consts::ARCH)).display().to_string();
+    vec![format!("-I{include}"), format!("-L{library}"), format!("-Wl,-rpath,{library}")]
+}
+
+/// Starts the CycloneDDS peer (see its file for the arguments) and waits until its endpoint stands.
+pub fn start_cyclone(domain: &Domain, python: &Path, arguments: &[&str]) -> Process {
+    let mut command = Command::new(python);
+    command.arg(own("peers/cyclone_peer.py")).args(arguments);
+    let process = Process::start(domain, command);
+    if arguments.first() != Some(&"call") {
+        assert_eq!(process.line(PATIENCE), "ready");
+    }
+    process
+}
+
+/// Starts the Fast DDS peer on a topic of parameter sets and waits until its endpoint stands.
+pub fn start_fast_dds(domain: &Domain, program: &Path, topic: &str, count: u32) -> Process {
+    let mut command = Command::new(program);
+    command.args([topic, &count.to_string(), &PATIENCE.as_secs().to_string()]);
+    let process = Process::start(domain, command);
+    assert_eq!(process.line(PATIENCE), "ready");
+    process
+}
+
+/// The next message that a peer prints.
+///
+/// # Panics
+/// When none comes in time, or it is not of the type.
+pub fn message<M: DeserializeOwned>(peer: &Process) -> M {
+    let line = peer.line(PATIENCE);
+    serde_json::from_str(&line).unwrap_or_else(|error| panic!("{error}: {line:.500}"))
+}

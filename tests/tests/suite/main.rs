@@ -1,0 +1,3 @@
+//! Topic-level tests: real processes, real DDS peers, real time.
+
+mod runtime;

@@ -1,0 +1,275 @@
+//! What the runtime promises, seen from outside by peers that share no code with it.
+
+use std::time::Duration;
+
+use gripsight_msgs::standard::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
+use gripsight_msgs::standard::rcl_interfaces::Log;
+use gripsight_msgs::{GapReport, PacejkaParams, StateSequence};
+use gripsight_tests::domain::Domain;
+use gripsight_tests::peers::{
+    PATIENCE, available, cyclone, fast_dds, message, start_cyclone, start_fast_dds,
+};
+use gripsight_tests::process::{Process, node};
+use gripsight_tests::samples;
+use serde_json::{Value, json};
+
+const PACEJKA: &str = "gripsight_msgs/msg/PacejkaParams";
+
+/// The node under test, once it is up.
+fn source(domain: &Domain, ros_args: &[&str]) -> Process {
+    let node = node(domain, "result_source", ros_args);
+    node.wait_for_log("publishes as", PATIENCE);
+    node
+}
+
+#[test]
+fn both_peers_decode_every_field() {
+    let (cyclone, fast_dds) = (cyclone(), fast_dds());
+    if !available(&[cyclone.clone(), fast_dds.clone()]) {
+        return;
+    }
+    let domain = Domain::new();
+    let args = ["--qos", "latched"];
+    let early = start_cyclone(
+        &domain,
+        &cyclone.unwrap(),
+        &[&["subscribe", "/result_source/pacejka", PACEJKA][..], &args].concat(),
+    );
+    let early_fast = start_fast_dds(&domain, &fast_dds.unwrap(), "/result_source/pacejka", 1);
+    let _node = source(&domain, &["-p", "seed:=11"]);
+    let expected = samples::pacejka(11);
+    assert_eq!(message::<PacejkaParams>(&early), expected, "CycloneDDS");
+    assert_eq!(message::<PacejkaParams>(&early_fast), expected, "Fast DDS");
+}
+
+#[test]
+fn late_joiners_get_the_last_result() {
+    let (cyclone, fast_dds) = (cyclone(), fast_dds());
+    if !available(&[cyclone.clone(), fast_dds.clone()]) {
+        return;
+    }
+    let domain = Domain::new();
+    let _node = source(&domain, &[]);
+    std::thread::sleep(Duration::from_secs(1));
+    let expected = samples::pacejka(7);
+    let late = start_cyclone(
+        &domain,
+        &cyclone.unwrap(),
+        &["subscribe", "/result_source/pacejka", PACEJKA, "--qos", "latched"],
+    );
+    assert_eq!(message::<PacejkaParams>(&late), expected, "CycloneDDS");
+    let late_fast = start_fast_dds(&domain, &fast_dds.unwrap(), "/result_source/pacejka", 1);
+    assert_eq!(message::<PacejkaParams>(&late_fast), expected, "Fast DDS");
+}
+
+#[test]
+fn sequences_of_140_kb_reach_cyclone() {
+    let cyclone = cyclone();
+    if !available(std::slice::from_ref(&cyclone)) {
+        return;
+    }
+    let domain = Domain::new();
+    let peer = start_cyclone(
+        &domain,
+        &cyclone.unwrap(),
+        &["subscribe", "/result_source/sequence", "gripsight_msgs/msg/StateSequence", "--count", "5"],
+    );
+    let _node = source(&domain, &["-p", "samples:=7000"]);
+    for _ in 0..5 {
+        assert!(message::<StateSequence>(&peer) == samples::sequence(7000), "the sequence differs");
+    }
+}
+
+/// Lengths of all four remainders modulo 4: without padding, CycloneDDS gets one in four.
+#[test]
+fn fragments_of_any_length_reach_cyclone() {
+    let cyclone = cyclone();
+    if !available(std::slice::from_ref(&cyclone)) {
+        return;
+    }
+    let domain = Domain::new();
+    let peer = start_cyclone(
+        &domain,
+        &cyclone.unwrap(),
+        &["subscribe", "/result_source/report", "gripsight_msgs/msg/GapReport", "--count", "8"],
+    );
+    let _node = source(&domain, &[]);
+    let first: GapReport = message(&peer);
+    let start = first.report_directory.len();
+    assert!(first == samples::report(start), "the first report differs");
+    for step in 1..8 {
+        let expected = samples::report((start + step) % 4);
+        assert!(message::<GapReport>(&peer) == expected, "report {step} is missing or differs");
+    }
+}
+
+#[test]
+fn names_are_remapped() {
+    let cyclone = cyclone();
+    if !available(std::slice::from_ref(&cyclone)) {
+        return;
+    }
+    let domain = Domain::new();
+    let _node = source(&domain, &["-r", "__ns:=/car", "-r", "__node:=mpc_source", "-r", "~/pacejka:=tires"]);
+    let python = cyclone.unwrap();
+    let remapped = start_cyclone(&domain, &python, &["subscribe", "/car/tires", PACEJKA, "--qos", "latched"]);
+    assert_eq!(message::<PacejkaParams>(&remapped), samples::pacejka(7));
+    let diagnostics = start_cyclone(
+        &domain,
+        &python,
+        &["subscribe", "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "--qos", "reliable"],
+    );
+    assert_eq!(message::<DiagnosticArray>(&diagnostics).status[0].name, "car/mpc_source: transport");
+}
+
+#[test]
+fn parameters_come_from_files_and_answer_to_services() {
+    let cyclone = cyclone();
+    if !available(std::slice::from_ref(&cyclone)) {
+        return;
+    }
+    let python = cyclone.unwrap();
+    let domain = Domain::new();
+    let file = std::env::temp_dir().join(format!("gripsight_parameters_{}.yaml", std::process::id()));
+    std::fs::write(&file, "/**:\n  ros__parameters:\n    samples: 20\n    vehicle: {name: rc10}\n").unwrap();
+    // The service mapping follows the RMW of the other side.
+    let mut command = std::process::Command::new(gripsight_tests::process::program("result_source"));
+    command.env("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp");
+    command.args(["--ros-args", "--params-file", file.to_str().unwrap(), "-p", "seed:=3"]);
+    let node = Process::start(&domain, command);
+    node.wait_for_log("rc10 publishes as /result_source", PATIENCE);
+
+    let call = |service: &str, type_name: &str, request: Value| {
+        let type_name = format!("rcl_interfaces/srv/{type_name}");
+        let service = format!("/result_source/{service}");
+        let request = request.to_string();
+        message::<Value>(&start_cyclone(&domain, &python, &["call", &service, &type_name, &request]))
+    };
+    let listed = call("list_parameters", "ListParameters", json!({}));
+    assert_eq!(
+        listed["result"]["names"],
+        json!(["reliable_inputs", "samples", "seed", "use_sim_time", "vehicle.name"])
+    );
+    let set = |value: Value| json!({"parameters": [{"name": "samples", "value": value}]});
+    let results = call("set_parameters", "SetParameters", set(json!({"type": 2, "integer_value": 30})));
+    assert_eq!(results["results"], json!([{"successful": true, "reason": ""}]));
+    let refused = call("set_parameters", "SetParameters", set(json!({"type": 2, "integer_value": 0})));
+    assert!(refused["results"][0]["reason"].as_str().unwrap().contains("expected 1 to 100000, got 0"));
+    let got = call("get_parameters", "GetParameters", json!({"names": ["samples", "seed", "none"]}));
+    let values = got["values"].as_array().unwrap();
+    let integers: Vec<_> =
+        values.iter().map(|value| (value["type"].clone(), value["integer_value"].clone())).collect();
+    assert_eq!(integers, [(json!(2), json!(30)), (json!(2), json!(3)), (json!(0), json!(0))]);
+    let described = call("describe_parameters", "DescribeParameters", json!({"names": ["samples"]}));
+    assert_eq!(described["descriptors"][0]["description"], "Samples per sequence");
+    assert_eq!(described["descriptors"][0]["integer_range"][0]["to_value"], 100_000);
+    let typed = call("get_parameter_types", "GetParameterTypes", json!({"names": ["vehicle.name"]}));
+    assert_eq!(typed["types"], json!([4]));
+    let atomic = json!({"parameters": [
+        {"name": "samples", "value": {"type": 2, "integer_value": 40}},
+        {"name": "vehicle.name", "value": {"type": 4, "string_value": "other"}},
+    ]});
+    let result = call("set_parameters_atomically", "SetParametersAtomically", atomic);
+    assert!(result["result"]["reason"].as_str().unwrap().contains("read-only"));
+    let unchanged = call("get_parameters", "GetParameters", json!({"names": ["samples"]}));
+    assert_eq!(unchanged["values"][0]["integer_value"], 30);
+    std::fs::remove_file(&file).unwrap();
+}
+
+#[test]
+fn no_sample_of_a_peer_is_lost() {
+    let cyclone = cyclone();
+    if !available(std::slice::from_ref(&cyclone)) {
+        return;
+    }
+    let python = cyclone.unwrap();
+    let domain = Domain::new();
+    let _node = source(&domain, &["-p", "reliable_inputs:=true", "-r", "odom:=/car_state/odom"]);
+    let odometry = "nav_msgs/msg/Odometry";
+    let listener =
+        start_cyclone(&domain, &python, &["subscribe", "/result_source/echo", odometry, "--count", "500"]);
+    std::thread::sleep(Duration::from_secs(1));
+    let mut publisher = start_cyclone(
+        &domain,
+        &python,
+        &["publish", "/car_state/odom", odometry, "--qos", "reliable", "--period", "0.002"],
+    );
+    let sent: Vec<Value> = (0..500)
+        .map(|index| {
+            json!({
+                "header": {"stamp": {"sec": index, "nanosec": 5}, "frame_id": "map"},
+                "child_frame_id": "base_link",
+                "twist": {"twist": {"linear": {"x": 0.1 * f64::from(index)}}},
+            })
+        })
+        .collect();
+    let text: String = sent.iter().map(|message| format!("{message}\n")).collect();
+    publisher.feed(&text);
+    for expected in &sent {
+        let received: Value = message(&listener);
+        assert_eq!(received["header"], expected["header"]);
+        assert_eq!(received["twist"]["twist"]["linear"]["x"], expected["twist"]["twist"]["linear"]["x"]);
+    }
+    assert!(publisher.wait(PATIENCE).success());
+}
+
+#[test]
+fn messages_that_cannot_be_decoded_become_a_diagnostic() {
+    let cyclone = cyclone();
+    if !available(std::slice::from_ref(&cyclone)) {
+        return;
+    }
+    let python = cyclone.unwrap();
+    let domain = Domain::new();
+    let _node = source(&domain, &[]);
+    // RustDDS matches by the topic's name alone, so a sequence on `odom` reaches the decoder.
+    let _wrong = source(&domain, &["-r", "__node:=wrong", "-r", "~/sequence:=/odom", "-p", "samples:=1"]);
+    let listener = start_cyclone(
+        &domain,
+        &python,
+        &["subscribe", "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "--count", "20"],
+    );
+    let is_warned = (0..20).any(|_| {
+        let transport = &message::<DiagnosticArray>(&listener).status[0];
+        transport.name == "result_source: transport"
+            && transport.level == DiagnosticStatus::WARN
+            && transport.values[0].key == "/odom"
+    });
+    assert!(is_warned);
+}
+
+#[test]
+fn logs_reach_rosout_and_late_joiners() {
+    let cyclone = cyclone();
+    if !available(std::slice::from_ref(&cyclone)) {
+        return;
+    }
+    let domain = Domain::new();
+    let _node = source(&domain, &["-r", "__ns:=/car"]);
+    let listener = start_cyclone(
+        &domain,
+        &cyclone.unwrap(),
+        &["subscribe", "/rosout", "rcl_interfaces/msg/Log", "--qos", "latched"],
+    );
+    let line: Log = message(&listener);
+    assert_eq!(line.msg, "car publishes as /car/result_source");
+    assert_eq!((line.name.as_str(), line.level), ("car.result_source", Log::INFO));
+}
+
+#[test]
+fn signals_end_the_node_cleanly() {
+    for signal in ["INT", "TERM"] {
+        let domain = Domain::new();
+        let mut node = source(&domain, &[]);
+        node.signal(signal);
+        assert!(node.wait(Duration::from_secs(10)).success(), "SIG{signal}");
+    }
+}
+
+#[test]
+fn a_wrong_parameter_stops_the_start() {
+    let domain = Domain::new();
+    let mut node = node(&domain, "result_source", &["-p", "samples:=0"]);
+    node.wait_for_log("expected 1 to 100000, got 0", PATIENCE);
+    assert!(!node.wait(PATIENCE).success());
+}
