@@ -3,6 +3,8 @@
 //! Standard output holds results, standard error progress and logs. Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but the
 //! result is not accepted (or not identifiable).
 
+mod simulate;
+
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -21,7 +23,9 @@ Exit codes: 0 done; 1 failed; 2 wrong usage; 3 done, but the result is not accep
 Results go to standard output, progress and logs to standard error; RUST_LOG=debug shows more.";
 
 #[derive(Debug, Subcommand)]
-enum Command {}
+enum Command {
+    Simulate(simulate::SimulateArgs),
+}
 
 /// How a subcommand ended that did not fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,5 +58,7 @@ fn main() -> ExitCode {
 }
 
 fn run(command: Command) -> anyhow::Result<Outcome> {
-    match command {}
+    match command {
+        Command::Simulate(args) => simulate::run(&args),
+    }
 }

@@ -1,7 +1,10 @@
 //! The cars: what a data sheet would say of each, and the checks that keep the physics meaningful.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
+use crate::effects::EffectSetting;
 use crate::error::ReferenceCarError;
 use crate::tire::TireParameters;
 
@@ -87,6 +90,10 @@ pub struct CarParameters {
     pub side_area_m2: f64,
     /// Centre of pressure of the side wind ahead of the centre of gravity.
     pub side_pressure_x_m: f64,
+    /// Air drag over mass and square of the speed, at its natural size.
+    pub drag_1pm: f64,
+    /// Rolling resistance over load, at its natural size.
+    pub rolling_resistance: f64,
     /// Speed that the car's tracks are laid out for.
     pub top_speed_mps: f64,
     /// Size of its tracks; 1 is a full-size circuit.
@@ -118,6 +125,23 @@ impl CarParameters {
     /// Wheelbase.
     pub fn wheelbase_m(&self) -> f64 {
         self.l_f_m + self.l_r_m
+    }
+
+    /// What this car has of its own beyond a single track, on a road of friction `road_friction`: load transfers,
+    /// relaxation, combined slip, drag and rolling resistance at their natural size.
+    pub fn own_effects(&self, road_friction: f64) -> Vec<EffectSetting> {
+        let own = |name: &str, parameter: &str, value: f64| EffectSetting {
+            name: name.to_owned(),
+            parameters: BTreeMap::from([(parameter.to_owned(), value)]),
+        };
+        vec![
+            own("lateral_load_transfer", "k", self.own_load_transfer_loss(road_friction)),
+            own("longitudinal_load_transfer", "h_m", self.h_cg_m),
+            own("tire_relaxation", "sigma_m", self.drive.wheel_radius_m),
+            own("combined_slip", "k", 1.0),
+            own("aero_drag", "c_1pm", self.drag_1pm),
+            own("rolling_resistance", "c", self.rolling_resistance),
+        ]
     }
 
     /// Share of its grip that an axle loses at the limit by the lateral load transfer of this car as it stands: the
@@ -180,6 +204,8 @@ impl CarParameters {
             ("drive.drive_limit", self.drive.drive_limit),
             ("drive.brake_limit", self.drive.brake_limit),
             ("side_area_m2", self.side_area_m2),
+            ("drag_1pm", self.drag_1pm),
+            ("rolling_resistance", self.rolling_resistance),
         ];
         for (name, value) in not_negative {
             check(name, value, value >= 0.0, "a finite number, not negative")?;
@@ -237,6 +263,8 @@ fn f1tenth() -> CarParameters {
         },
         side_area_m2: 0.05,
         side_pressure_x_m: 0.02,
+        drag_1pm: 0.006,
+        rolling_resistance: 0.02,
         top_speed_mps: 8.0,
         track_scale: 0.05,
     }
@@ -282,6 +310,8 @@ fn formula_student() -> CarParameters {
         },
         side_area_m2: 0.9,
         side_pressure_x_m: 0.1,
+        drag_1pm: 0.0022,
+        rolling_resistance: 0.015,
         top_speed_mps: 28.0,
         track_scale: 0.32,
     }
@@ -327,6 +357,8 @@ fn race_car() -> CarParameters {
         },
         side_area_m2: 1.8,
         side_pressure_x_m: 0.25,
+        drag_1pm: 0.0009,
+        rolling_resistance: 0.012,
         top_speed_mps: 70.0,
         track_scale: 1.0,
     }
@@ -372,6 +404,8 @@ fn passenger_car() -> CarParameters {
         },
         side_area_m2: 2.6,
         side_pressure_x_m: 0.3,
+        drag_1pm: 0.00027,
+        rolling_resistance: 0.011,
         top_speed_mps: 45.0,
         track_scale: 0.7,
     }

@@ -22,8 +22,6 @@ use crate::tire::{Contact, Tire, TireForce};
 /// Time constant of the steering linkage under load.
 const COMPLIANCE_TIME_S: f64 = 0.012;
 const AIR_DENSITY_KGPM3: f64 = 1.2;
-/// Speed difference between the wheels of an axle at which the differential locks with about three quarters.
-const LOCKING_SPEED_MPS: f64 = 0.1;
 
 /// Motion and internal states of the car.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -320,8 +318,11 @@ impl Plant {
                     * share
                     * ramp;
                 let faster_mps = (s.wheel_radps[first + 1] - s.wheel_radps[first]) * radius;
-                let shift_nm =
-                    moment_nm * radius / self.car.track_width_m * (faster_mps / LOCKING_SPEED_MPS).tanh();
+                // In a corner without wheel spin this is r L/v; a spinning inner wheel changes its sign.
+                let locking = faster_mps / s.v_x_mps.abs().max(self.low_speed_mps)
+                    * (self.l_f_m + self.l_r_m)
+                    / self.car.track_width_m;
+                let shift_nm = moment_nm * radius / self.car.track_width_m * locking.tanh();
                 wheels[first].torque_nm += shift_nm;
                 wheels[first + 1].torque_nm -= shift_nm;
             }

@@ -121,7 +121,7 @@ impl Simulation {
                 break;
             }
         }
-        Recording { samples: self.samples, truth: self.truth, end }
+        Recording { samples: self.drain(), truth: self.truth, end }
     }
 
     /// Time since the start of the run.
@@ -171,9 +171,11 @@ impl Simulation {
         self.samples.extend(self.sensors.drive(sample));
     }
 
-    /// Takes what the sensors reported since the last call.
+    /// Takes what the sensors reported since the last call, by stamp.
     pub fn drain(&mut self) -> Vec<SensorSample> {
-        std::mem::take(&mut self.samples)
+        let mut samples = std::mem::take(&mut self.samples);
+        samples.sort_by(|a, b| a.stamp_s().total_cmp(&b.stamp_s()));
+        samples
     }
 
     /// One step of the integration; the sensors report.
