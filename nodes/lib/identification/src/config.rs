@@ -1,6 +1,6 @@
 //! Settings of a run.
 
-use gripsight_s4::Architecture;
+use gripsight_s4::{Architecture, NetworkConfig, TrainingConfig};
 use gripsight_vehicle::{MagicFormula, PacejkaParameters};
 use serde::{Deserialize, Serialize};
 
@@ -78,6 +78,16 @@ pub struct Config {
     pub max_iterations: u32,
     /// Converged when a turn changes the tire curves by less than this share of their peak, anywhere within the slips driven.
     pub tolerance: f64,
+    /// Width of the residual network.
+    pub d_model: usize,
+    /// States per channel, S4 only.
+    pub d_state: usize,
+    /// Hidden layers of the residual network.
+    pub layers: usize,
+    /// Epochs of training at most, each turn.
+    pub epochs: usize,
+    /// Whether the robust method starts from the direct fit (else from `initial`, as the paper does).
+    pub direct_start: bool,
 }
 
 impl Default for Config {
@@ -92,6 +102,35 @@ impl Default for Config {
             initial: PacejkaParameters { front: axle, rear: axle },
             max_iterations: 8,
             tolerance: 0.02,
+            d_model: 16,
+            d_state: 16,
+            layers: 1,
+            epochs: 80,
+            direct_start: true,
+        }
+    }
+}
+
+impl Config {
+    /// The residual network's shape.
+    pub(crate) fn network(&self) -> NetworkConfig {
+        NetworkConfig {
+            architecture: self.residual.architecture().unwrap_or(Architecture::S4),
+            inputs: crate::INPUTS.len(),
+            outputs: crate::OUTPUTS.len(),
+            d_model: self.d_model,
+            d_state: self.d_state,
+            layers: self.layers,
+            ..NetworkConfig::default()
+        }
+    }
+
+    /// How it is trained.
+    pub(crate) fn training(&self) -> TrainingConfig {
+        TrainingConfig {
+            epochs_max: self.epochs,
+            patience: self.epochs.div_ceil(4),
+            ..TrainingConfig::default()
         }
     }
 }

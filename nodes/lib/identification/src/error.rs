@@ -57,6 +57,14 @@ pub enum IdentificationError {
         /// Key of the model.
         got: String,
     },
+    /// The previous set belongs to a car with other parameters.
+    #[error("the previous set is for vehicle {got}, this one is {expected}")]
+    OtherCar {
+        /// Key of this car.
+        expected: String,
+        /// Key of the set's car.
+        got: String,
+    },
     /// The caller ended the training.
     #[error("the training was interrupted")]
     Interrupted,

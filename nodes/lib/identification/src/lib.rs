@@ -3,14 +3,26 @@
 //! [`identify`] is the whole way; [`Identification`] and [`train_residual`] are its halves, which run in two nodes when live.
 //! [`shooting`] is the least-squares engine underneath.
 
+mod acceptance;
 mod candidate;
+mod conclude;
 mod config;
+mod data;
+mod direct;
 mod error;
 pub mod export;
+mod extract;
+mod judge;
+pub mod nelder_mead;
 mod outcome;
+mod picture;
+mod residual;
 mod residual_model;
+mod rollout;
 mod run;
 pub mod shooting;
+mod sweep;
+pub mod tires;
 
 pub use candidate::{
     AcceptedSet, Candidate, Estimate, FrictionPrior, PerAxle, Range, RunKey, SignalCorrections, vehicle_hash,
@@ -21,5 +33,6 @@ pub use outcome::{
     Change, HorizonError, IterationRecord, Outcome, PeakFriction, Rmse, RmseReport, SignalEstimates, Source,
     TireCurve, Trace, WeakSignal,
 };
+pub use residual::train_residual;
 pub use residual_model::{INPUTS, OUTPUTS, ResidualModel};
-pub use run::{Identification, Next, Stage, identify, train_residual};
+pub use run::{Identification, Next, Stage, Started, identify};

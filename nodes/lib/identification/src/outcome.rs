@@ -38,6 +38,20 @@ pub struct SignalEstimates {
     pub yaw_rate_bias_radps: Estimate,
 }
 
+impl SignalEstimates {
+    /// In the order of the fields.
+    pub(crate) fn from_array(e: [Estimate; 6]) -> Self {
+        Self {
+            steering_delay_s: e[0],
+            steering_gain: e[1],
+            steering_offset_rad: e[2],
+            v_y_lever_arm_m: e[3],
+            v_y_bias_mps: e[4],
+            yaw_rate_bias_radps: e[5],
+        }
+    }
+}
+
 /// A correction that the data hardly tell: what its value rests on instead.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WeakSignal {
@@ -121,7 +135,7 @@ pub struct IterationRecord {
 }
 
 /// A tire curve for the report: F_y/F_z over slip.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct TireCurve {
     /// Slip angles of the points, rad, from 0.
     pub slip_rad: Vec<f64>,
@@ -141,6 +155,8 @@ pub struct TireCurve {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
+    /// Nothing was fitted: these are the tires that the run started from.
+    Start,
     /// The direct least-squares fit predicted held-out data better.
     LeastSquares,
     /// The residual loop predicted held-out data better.

@@ -8,10 +8,21 @@
 
 use std::ops::ControlFlow;
 
-use gripsight_signals::StateSequence;
-use gripsight_vehicle::VehicleParameters;
+use gripsight_signals::{DataHealth, Excitation, StateSequence};
+use gripsight_vehicle::{MagicFormula, PacejkaParameters, VehicleParameters};
 
-use crate::{AcceptedSet, Candidate, Config, FrictionPrior, IdentificationError, Outcome, ResidualModel};
+use crate::conclude::{Request, conclude, refused};
+use crate::data::{Data, Part};
+use crate::direct::{Direct, direct};
+use crate::extract::extract;
+use crate::judge::rollout_errors;
+use crate::rollout::{TireRollout, vector_of};
+use crate::sweep::{Point, sweep};
+use crate::tires::curve_change;
+use crate::{
+    AcceptedSet, Candidate, Config, FrictionPrior, IdentificationError, IterationRecord, Method, Outcome,
+    PerAxle, ResidualModel, RunKey, train_residual, vehicle_hash,
+};
 
 /// What a run wants next.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,6 +31,15 @@ pub enum Next {
     Candidate(Candidate),
     /// Nothing: it has ended.
     Done(Box<Outcome>),
+}
+
+/// How a run begins.
+#[derive(Debug, Clone)]
+pub enum Started {
+    /// It waits for the residual model of its [`Identification::candidate`].
+    Running(Box<Identification>),
+    /// The telemetry cannot tell about the tires: not accepted, with reasons.
+    Refused(Box<Outcome>),
 }
 
 /// Where [`identify`] stands. Whoever wants times takes them when told.
@@ -43,38 +63,90 @@ pub enum Stage {
         /// Turn of the outer loop, from 1.
         iteration: u32,
     },
-    /// The outcome stands.
-    Finished,
 }
 
 /// An identification under way.
 #[derive(Debug, Clone)]
 pub struct Identification {
-    candidate: Option<Candidate>,
+    pub(crate) data: Data,
+    pub(crate) vehicle: VehicleParameters,
+    pub(crate) prior: Option<FrictionPrior>,
+    pub(crate) previous: Option<AcceptedSet>,
+    pub(crate) config: Config,
+    pub(crate) initial: PacejkaParameters,
+    pub(crate) direct: Direct,
+    /// Turns taken.
+    pub(crate) history: Vec<IterationRecord>,
+    pub(crate) candidate: Candidate,
+    ended: bool,
 }
 
 impl Identification {
-    /// Looks at the telemetry, corrects the signals, finds start values.
+    /// Looks at the telemetry, corrects the signals, finds start values. Telemetry that cannot tell about the tires ends the run at once, not
+    /// accepted, with reasons.
     ///
-    /// `prior` starts D and holds it where the peak is not reached; `previous` is where the run starts (warm start) and what
-    /// the result has to beat.
+    /// `prior` starts D and holds it where the peak is not reached; `previous` is where the run starts (warm start) and what the result
+    /// has to beat.
     ///
     /// # Errors
-    /// [`IdentificationError`] for telemetry that is malformed, frozen, too short or without excitation.
+    /// [`IdentificationError`] for telemetry that is malformed or frozen, settings out of range, or a previous set of another car.
     pub fn start(
-        _sequence: &StateSequence,
-        _vehicle: &VehicleParameters,
-        _prior: Option<FrictionPrior>,
-        _previous: Option<&AcceptedSet>,
-        _config: &Config,
-    ) -> Result<(Self, Candidate), IdentificationError> {
-        Err(IdentificationError::Ended)
+        sequence: &StateSequence,
+        vehicle: &VehicleParameters,
+        prior: Option<FrictionPrior>,
+        previous: Option<&AcceptedSet>,
+        config: &Config,
+    ) -> Result<Started, IdentificationError> {
+        check(vehicle, prior, previous, config)?;
+        let key = RunKey {
+            run_id: config.run_id.clone(),
+            sequence_id: sequence.sequence_id,
+            iteration: 0,
+            vehicle_hash: vehicle_hash(vehicle),
+            seed: config.seed,
+        };
+        let initial = initial_tires(prior, previous, config);
+        let health = DataHealth::of(sequence)?;
+        let refuse = |reason: String, drive: &str| {
+            let request = Request { key: &key, vehicle, prior, config, initial: &initial };
+            Started::Refused(Box::new(refused(&request, &health, vec![reason], vec![drive.to_owned()])))
+        };
+        if let Some(reason) = Excitation::of(sequence)?.insufficient {
+            return Ok(refuse(reason, "drive corners both ways, at growing speed, for half a minute"));
+        }
+        let data = match Data::new(sequence, vehicle, &health) {
+            Err(error @ IdentificationError::TooLittle { drive, .. }) => {
+                return Ok(refuse(error.to_string(), drive));
+            }
+            other => other?,
+        };
+        let warm = previous.map(|p| (&p.phi_p, &p.corrections));
+        let direct = direct(&data, vehicle, prior, warm)?;
+        let phi_p = match config.method {
+            Method::Robust if config.direct_start => direct.tires,
+            _ => initial,
+        };
+        let candidate =
+            Candidate { key, phi_p, corrections: direct.corrections, mean_speed_mps: data.mean_speed_mps };
+        let run = Self {
+            data,
+            vehicle: vehicle.clone(),
+            prior,
+            previous: previous.cloned(),
+            config: config.clone(),
+            initial,
+            direct,
+            history: Vec::new(),
+            candidate,
+            ended: false,
+        };
+        Ok(Started::Running(Box::new(run)))
     }
 
     /// The candidate that waits for its residual model; `None` once the run has ended.
     #[must_use]
     pub fn candidate(&self) -> Option<&Candidate> {
-        self.candidate.as_ref()
+        (!self.ended).then_some(&self.candidate)
     }
 
     /// Takes the residual model of the waiting candidate: drives the virtual test, fits the tires, and asks for the next or ends.
@@ -82,24 +154,109 @@ impl Identification {
     /// # Errors
     /// [`IdentificationError::WrongModel`] for a model that answers another candidate (the run goes on waiting),
     /// [`IdentificationError::Ended`] after the end, [`IdentificationError::Network`] for weights that do not fit.
-    pub fn advance(&mut self, _model: &ResidualModel) -> Result<Next, IdentificationError> {
-        Err(IdentificationError::Ended)
+    pub fn advance(&mut self, model: &ResidualModel) -> Result<Next, IdentificationError> {
+        if self.ended {
+            return Err(IdentificationError::Ended);
+        }
+        if model.key != self.candidate.key || model.phi_p != self.candidate.phi_p {
+            let (expected, got) = (self.candidate.key.to_string(), model.key.to_string());
+            return Err(IdentificationError::WrongModel { expected, got });
+        }
+        let turn = self.turn(model)?;
+        let converged = turn.change < self.config.tolerance;
+        self.candidate.phi_p = turn.phi_p;
+        self.candidate.key.iteration = turn.iteration;
+        self.history.push(turn);
+        if converged || self.candidate.key.iteration >= self.config.max_iterations {
+            self.ended = true;
+            return Ok(Next::Done(Box::new(conclude(self, converged))));
+        }
+        Ok(Next::Candidate(self.candidate.clone()))
+    }
+
+    /// One turn of the outer loop.
+    fn turn(&self, model: &ResidualModel) -> Result<IterationRecord, IdentificationError> {
+        let swept = sweep(&self.vehicle, model, self.candidate.mean_speed_mps, self.config.method)?;
+        let robust = self.config.method == Method::Robust;
+        let fit = |points: &[Point], start: &MagicFormula, reached: bool| {
+            extract(points, start, robust && !reached, robust)
+        };
+        let (at, peak) = (&self.candidate.phi_p, &self.direct.peak);
+        let front = fit(&swept.points.front, &at.front, peak.front.reached)?;
+        let rear = fit(&swept.points.rear, &at.rear, peak.rear.reached)?;
+        let phi_p = PacejkaParameters { front: front.axle, rear: rear.axle };
+        let slips =
+            PerAxle { front: self.direct.slips.front.range_rad, rear: self.direct.slips.rear.range_rad };
+        Ok(IterationRecord {
+            iteration: self.candidate.key.iteration + 1,
+            phi_p,
+            change: curve_change(at, &phi_p, &slips),
+            fit_rmse: (0.5 * (front.rmse.powi(2) + rear.rmse.powi(2))).sqrt(),
+            evaluations: front.evaluations + rear.evaluations,
+            sweep_speed_mps: swept.speed_mps,
+            extrapolated_share: swept.extrapolated_share,
+            validation_rmse: self.validation_error(&phi_p),
+            epochs: model.epochs,
+            residual_loss: model.validation_loss,
+        })
+    }
+
+    /// Error of rollouts on the validation part, in noises.
+    pub(crate) fn validation_error(&self, tires: &PacejkaParameters) -> f64 {
+        let rollout = TireRollout { vehicle: &self.vehicle, segments: &self.data.segments };
+        let windows = self.data.part(Part::Validation);
+        let p = vector_of(tires, &self.direct.corrections);
+        rollout_errors(&rollout, &p, &windows, &self.direct.sigma).normalized
     }
 }
 
-/// Learns what the single-track model with the candidate's tires leaves over. A pure function of sequence, car, candidate and settings.
-/// `progress` is called after each epoch and may end the training.
-///
-/// # Errors
-/// [`IdentificationError`], as in [`Identification::start`]; [`IdentificationError::Interrupted`] where `progress` ended it.
-pub fn train_residual(
-    _sequence: &StateSequence,
-    _vehicle: &VehicleParameters,
-    _candidate: &Candidate,
-    _config: &Config,
-    _progress: &mut dyn FnMut(gripsight_s4::Progress) -> ControlFlow<()>,
-) -> Result<ResidualModel, IdentificationError> {
-    Err(IdentificationError::Ended)
+/// Where a run starts: the previous set, or the configured tires; D from the friction prior where there is one.
+fn initial_tires(
+    prior: Option<FrictionPrior>,
+    previous: Option<&AcceptedSet>,
+    config: &Config,
+) -> PacejkaParameters {
+    let Some(previous) = previous else {
+        let start = |axle: &MagicFormula| match prior {
+            // At the same stiffness: a friction prior says nothing about it.
+            Some(p) => MagicFormula::from_stiffness(axle.normalized_stiffness(), axle.c, p.mu, axle.e),
+            None => *axle,
+        };
+        return PacejkaParameters { front: start(&config.initial.front), rear: start(&config.initial.rear) };
+    };
+    previous.phi_p
+}
+
+fn check(
+    vehicle: &VehicleParameters,
+    prior: Option<FrictionPrior>,
+    previous: Option<&AcceptedSet>,
+    config: &Config,
+) -> Result<(), IdentificationError> {
+    let setting = |name, got, must| Err(IdentificationError::Setting { name, got, must });
+    if let Some(p) = prior {
+        let (low, high) = crate::tires::D_BOUNDS;
+        if !(low..=high).contains(&p.mu) {
+            return setting("friction prior mu", p.mu, "between 0.05 and 3.5");
+        }
+        if !(p.sigma.is_finite() && p.sigma > 0.0) {
+            return setting("friction prior sigma", p.sigma, "positive and finite");
+        }
+    }
+    if let Some(previous) = previous.filter(|p| p.vehicle_hash != vehicle_hash(vehicle)) {
+        let (expected, got) = (vehicle_hash(vehicle), previous.vehicle_hash.clone());
+        return Err(IdentificationError::OtherCar { expected, got });
+    }
+    if !config.initial.is_finite() {
+        return Err(IdentificationError::NotFinite { what: "initial tires" });
+    }
+    if config.max_iterations == 0 {
+        return setting("max_iterations", 0.0, "at least 1");
+    }
+    if !(config.tolerance.is_finite() && config.tolerance > 0.0) {
+        return setting("tolerance", config.tolerance, "positive and finite");
+    }
+    Ok(())
 }
 
 /// A whole run. `progress` is told what begins.
@@ -115,22 +272,21 @@ pub fn identify(
     progress: &mut dyn FnMut(Stage),
 ) -> Result<Outcome, IdentificationError> {
     progress(Stage::Preparing);
-    let (mut run, mut candidate) = Identification::start(sequence, vehicle, prior, previous, config)?;
+    let mut run = match Identification::start(sequence, vehicle, prior, previous, config)? {
+        Started::Running(run) => run,
+        Started::Refused(outcome) => return Ok(*outcome),
+    };
+    let epochs_max = config.epochs;
     loop {
-        let iteration = candidate.key.iteration + 1;
-        let epochs_max = 0;
+        let iteration = run.candidate.key.iteration + 1;
         progress(Stage::Training { iteration, epoch: 0, epochs_max, loss: f64::NAN });
-        let model = train_residual(sequence, vehicle, &candidate, config, &mut |p| {
+        let model = train_residual(sequence, vehicle, &run.candidate, config, &mut |p| {
             progress(Stage::Training { iteration, epoch: p.epoch, epochs_max, loss: p.validation_loss });
             ControlFlow::Continue(())
         })?;
         progress(Stage::Fitting { iteration });
-        match run.advance(&model)? {
-            Next::Candidate(next) => candidate = next,
-            Next::Done(outcome) => {
-                progress(Stage::Finished);
-                return Ok(*outcome);
-            }
+        if let Next::Done(outcome) = run.advance(&model)? {
+            return Ok(*outcome);
         }
     }
 }

@@ -57,6 +57,19 @@ impl Fit {
         Some(&inverse * meat * &inverse * small_sample)
     }
 
+    /// Covariance of some parameters of the model; those that were not free count as known. `None` where the information is singular.
+    #[must_use]
+    pub fn covariance_of(&self, parameters: &[usize]) -> Option<DMatrix<f64>> {
+        let all = self.covariance()?;
+        let place = |j: usize| self.free.iter().position(|&f| f == j);
+        Some(DMatrix::from_fn(parameters.len(), parameters.len(), |a, b| {
+            match (place(parameters[a]), place(parameters[b])) {
+                (Some(a), Some(b)) => all[(a, b)],
+                _ => 0.0,
+            }
+        }))
+    }
+
     /// Standard error of parameter `j` of the model; `None` if it was not free or nothing is known of it.
     #[must_use]
     pub fn standard_error(&self, j: usize) -> Option<f64> {

@@ -1,0 +1,81 @@
+//! Whether a set may be used, and why not: every reason with its figure.
+
+use crate::conclude::unstable_at_mps;
+use crate::{Identification, Outcome, PeakFriction};
+
+/// A new set may predict held-out data this much worse than the previous one and still replace it: both are within noise.
+const NO_WORSE: f64 = 1.02;
+
+/// Fills in verdict, reasons and advice.
+pub(crate) fn judge(run: &Identification, outcome: &mut Outcome) {
+    let mut against = Vec::new();
+    let mut remarks = Vec::new();
+    let mut drive = Vec::new();
+    if !outcome.phi_p.is_finite() {
+        against.push("the tires are not finite".to_owned());
+    }
+    if !outcome.on_bound.is_empty() {
+        against.push(format!("on a bound: {}", outcome.on_bound.join(", ")));
+    }
+    let rollout = &outcome.rmse.rollout;
+    let (limit, than) = match run.previous {
+        Some(_) => (NO_WORSE * rollout.before, "the set in use"),
+        None => (rollout.before, "the initial tires"),
+    };
+    if rollout.after.is_nan() || rollout.after > limit {
+        against.push(format!(
+            "held-out rollouts miss by {:.3} noises, with {than} by {:.3}",
+            rollout.after, rollout.before
+        ));
+    }
+    if let Some(v_mps) = unstable_at_mps(&run.vehicle, &outcome.phi_p, &outcome.v_x_range_mps) {
+        against.push(format!(
+            "the car would be unstable above {v_mps:.1} m/s, and was driven at {:.1} m/s",
+            outcome.v_x_range_mps.high
+        ));
+    }
+    let peak = &outcome.peak_friction;
+    for (axle, friction, slip) in [
+        ("front", &peak.front, &outcome.slip_range_rad.front),
+        ("rear", &peak.rear, &outcome.slip_range_rad.rear),
+    ] {
+        let PeakFriction { value, reached, from_prior, .. } = *friction;
+        if reached {
+            continue;
+        }
+        let furthest = slip.low.abs().max(slip.high.abs()).to_degrees();
+        let what = format!("{axle} peak not reached: slip stayed within {furthest:.1} degrees");
+        if from_prior {
+            remarks.push(format!("{what}; D = {value:.2} is the prior's"));
+        } else {
+            against.push(format!("{what}; D = {value:.2} is a guess, give a friction prior"));
+        }
+        drive.push(format!(
+            "corner harder until the {axle} tires slide (more than {furthest:.1} degrees of slip)"
+        ));
+    }
+    if !outcome.converged {
+        remarks.push(format!(
+            "not converged: the last of {} turns changed the curves by {:.1} %",
+            outcome.iterations,
+            100.0 * outcome.history.last().map_or(f64::NAN, |t| t.change)
+        ));
+    }
+    for weak in &outcome.weak_signals {
+        remarks.push(format!(
+            "{} rests on its prior (sigma {:.3}): the data give {:.0} % of what is known of it",
+            weak.name,
+            weak.prior_sigma,
+            100.0 * weak.data_share
+        ));
+    }
+    if outcome.weak_signals.iter().any(|w| w.name == "steering_gain" || w.name == "v_y_lever_arm_m") {
+        drive.push(
+            "the same corners at half and at full speed: gain and lever arm then part from the tires"
+                .to_owned(),
+        );
+    }
+    outcome.accepted = against.is_empty();
+    outcome.reasons = against.into_iter().chain(remarks).collect();
+    outcome.drive_next = drive;
+}

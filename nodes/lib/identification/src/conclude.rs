@@ -1,0 +1,246 @@
+//! The end of a run: which tires, with which intervals, and whether they may be used.
+
+use gripsight_signals::DataHealth;
+use gripsight_vehicle::{
+    MagicFormula, PacejkaParameters, VehicleParameters,
+    handling::{critical_speed_mps, straight_line_growth_rate_1ps},
+};
+
+use crate::data::Part;
+use crate::judge::{best_starts, errors_over_horizon, one_step_errors, rollout_errors};
+use crate::picture::{curves, trace};
+use crate::rollout::{NAMES, SIGNALS, TireRollout, vector_of};
+use crate::tires::on_bound;
+use crate::{
+    Change, Config, Estimate, FrictionPrior, HorizonError, Identification, Outcome, PeakFriction, PerAxle,
+    Range, Rmse, RmseReport, RunKey, SignalCorrections, SignalEstimates, Source, Trace, WeakSignal,
+};
+
+/// The residual loop has to beat the direct fit on the validation part by this share: of near equals the simpler wins.
+const LOOP_GAIN: f64 = 0.01;
+/// Longest horizon of the rollout errors.
+const HORIZON_S: f64 = 2.0;
+/// Below this share of information from the data a correction rests on its prior.
+const WEAK_SHARE: f64 = 0.5;
+
+/// What a run was asked.
+pub(crate) struct Request<'a> {
+    pub(crate) key: &'a RunKey,
+    pub(crate) vehicle: &'a VehicleParameters,
+    pub(crate) prior: Option<FrictionPrior>,
+    pub(crate) config: &'a Config,
+    pub(crate) initial: &'a PacejkaParameters,
+}
+
+/// The outcome of telemetry that was not fitted at all.
+pub(crate) fn refused(
+    request: &Request<'_>,
+    health: &DataHealth,
+    reasons: Vec<String>,
+    drive_next: Vec<String>,
+) -> Outcome {
+    let unknown = Estimate::from_error(f64::NAN, None);
+    let nowhere = Range { low: f64::NAN, high: f64::NAN };
+    let peak = |axle: &MagicFormula| PeakFriction {
+        value: axle.d,
+        low: f64::NAN,
+        high: f64::NAN,
+        reached: false,
+        from_prior: request.prior.is_some(),
+    };
+    let change = Change { before: f64::NAN, after: f64::NAN };
+    let rmse = Rmse { before: f64::NAN, after: f64::NAN, v_y_mps: change, yaw_rate_radps: change };
+    Outcome {
+        phi_p: *request.initial,
+        cornering_stiffness_n_per_rad: PerAxle { front: unknown, rear: unknown },
+        peak_friction: PerAxle { front: peak(&request.initial.front), rear: peak(&request.initial.rear) },
+        iterations: 0,
+        converged: false,
+        accepted: false,
+        reasons,
+        slip_range_rad: PerAxle { front: nowhere, rear: nowhere },
+        v_x_range_mps: nowhere,
+        mean_speed_mps: f64::NAN,
+        signals: SignalCorrections::NONE,
+        signal_intervals: SignalEstimates::from_array([unknown; 6]),
+        weak_signals: Vec::new(),
+        rmse: RmseReport { one_step: rmse, rollout: rmse, horizon_s: f64::NAN, noise: [f64::NAN; 2] },
+        rollout_error: Vec::new(),
+        source: Source::Start,
+        on_bound: Vec::new(),
+        initial: *request.initial,
+        least_squares: None,
+        history: Vec::new(),
+        curves: PerAxle::default(),
+        prior: request.prior,
+        health: health.clone(),
+        drive_next,
+        key: request.key.clone(),
+        config: request.config.clone(),
+        vehicle: request.vehicle.clone(),
+        trace: Trace::default(),
+    }
+}
+
+/// The outcome of a run that went through its turns.
+pub(crate) fn conclude(run: &Identification, converged: bool) -> Outcome {
+    let (phi_p, source) = choose(run);
+    let corrections = run.direct.corrections;
+    let rollout = TireRollout { vehicle: &run.vehicle, segments: &run.data.segments };
+    let test = run.data.part(Part::Test);
+    let noise = run.direct.sigma;
+    let after = vector_of(&phi_p, &corrections);
+    let before_corrections = run.previous.as_ref().map_or(SignalCorrections::NONE, |p| p.corrections);
+    let before = vector_of(&run.initial, &before_corrections);
+    let rmse = |errors: fn(
+        &TireRollout<'_>,
+        &[f64; 14],
+        &[crate::shooting::Window],
+        &[f64; 2],
+    ) -> crate::judge::Errors| {
+        let (b, a) = (errors(&rollout, &before, &test, &noise), errors(&rollout, &after, &test, &noise));
+        let channel = |c: usize| Change { before: b.rms[c], after: a.rms[c] };
+        Rmse { before: b.normalized, after: a.normalized, v_y_mps: channel(0), yaw_rate_radps: channel(1) }
+    };
+    let window_len = test.first().map_or(0, |w| w.len);
+    let starts = best_starts(&rollout, &after, &test, &noise);
+    let len = (HORIZON_S / run.data.dt_s).round() as usize;
+    let over = |p: &[f64; 14]| errors_over_horizon(&rollout, &run.data, p, &test, &starts, len);
+    let rollout_error = over(&before)
+        .into_iter()
+        .zip(over(&after))
+        .enumerate()
+        .map(|(k, (before, after))| HorizonError { horizon_s: k as f64 * run.data.dt_s, before, after })
+        .collect();
+    let slips = PerAxle { front: run.direct.slips.front.range_rad, rear: run.direct.slips.rear.range_rad };
+    let (key, request_initial) = (run.candidate.key.clone(), run.initial);
+    let mut outcome = Outcome {
+        phi_p,
+        cornering_stiffness_n_per_rad: stiffness(run, &phi_p),
+        peak_friction: peak_friction(run, &phi_p),
+        iterations: key.iteration,
+        converged,
+        accepted: false,
+        reasons: Vec::new(),
+        slip_range_rad: slips,
+        v_x_range_mps: Range::of(run.data.samples(|s, k| s.v_x_mps[k])),
+        mean_speed_mps: run.data.mean_speed_mps,
+        signals: corrections,
+        signal_intervals: signal_intervals(run),
+        weak_signals: weak_signals(run),
+        rmse: RmseReport {
+            one_step: rmse(one_step_errors),
+            rollout: rmse(rollout_errors),
+            horizon_s: window_len as f64 * run.data.dt_s,
+            noise,
+        },
+        rollout_error,
+        source,
+        on_bound: on_bound(&phi_p),
+        initial: request_initial,
+        least_squares: Some(run.direct.tires),
+        history: run.history.clone(),
+        curves: curves(run, &phi_p),
+        prior: run.prior,
+        health: run.data.health.clone(),
+        drive_next: Vec::new(),
+        key,
+        config: run.config.clone(),
+        vehicle: run.vehicle.clone(),
+        trace: trace(run, &before, &after),
+    };
+    crate::acceptance::judge(run, &mut outcome);
+    outcome
+}
+
+/// The tires that predict the validation part best; the paper's method takes its last.
+fn choose(run: &Identification) -> (PacejkaParameters, Source) {
+    let last = || run.history.last().map_or(run.initial, |turn| turn.phi_p);
+    if run.config.method == crate::Method::Paper {
+        return (last(), Source::ResidualLoop);
+    }
+    let best = run.history.iter().min_by(|a, b| a.validation_rmse.total_cmp(&b.validation_rmse));
+    let direct = run.validation_error(&run.direct.tires);
+    match best {
+        Some(turn) if !run.config.direct_start || turn.validation_rmse < (1.0 - LOOP_GAIN) * direct => {
+            (turn.phi_p, Source::ResidualLoop)
+        }
+        _ => (run.direct.tires, Source::LeastSquares),
+    }
+}
+
+/// An estimate around `value` from the direct fit's standard error, widened by how far the direct fit lies off.
+fn around(value: f64, direct: f64, error: Option<f64>) -> Estimate {
+    let half = error.map_or(f64::NAN, |e| Estimate::Z90 * e) + (value - direct).abs();
+    Estimate { value, low: value - half, high: value + half }
+}
+
+fn stiffness(run: &Identification, tires: &PacejkaParameters) -> PerAxle<Estimate> {
+    let axle = |axle: &MagicFormula, direct: &MagicFormula, offset: usize, load_n: f64| {
+        let (k, d) = (axle.normalized_stiffness(), direct.normalized_stiffness());
+        let e = around(k, d, run.direct.fit.standard_error(offset));
+        Estimate { value: e.value * load_n, low: e.low.max(0.0) * load_n, high: e.high * load_n }
+    };
+    PerAxle {
+        front: axle(&tires.front, &run.direct.tires.front, 0, run.vehicle.static_load_front_n()),
+        rear: axle(&tires.rear, &run.direct.tires.rear, 4, run.vehicle.static_load_rear_n()),
+    }
+}
+
+fn peak_friction(run: &Identification, tires: &PacejkaParameters) -> PerAxle<PeakFriction> {
+    let axle = |axle: &MagicFormula, direct: &MagicFormula, offset: usize, reached: bool| {
+        if reached {
+            let e = around(axle.d, direct.d, run.direct.fit.standard_error(offset + 2));
+            PeakFriction { value: e.value, low: e.low.max(0.0), high: e.high, reached, from_prior: false }
+        } else {
+            let half = run.prior.map_or(f64::NAN, |p| Estimate::Z90 * p.sigma);
+            let from_prior = run.prior.is_some();
+            PeakFriction {
+                value: axle.d,
+                low: (axle.d - half).max(0.0),
+                high: axle.d + half,
+                reached,
+                from_prior,
+            }
+        }
+    };
+    let (peak, direct) = (&run.direct.peak, &run.direct.tires);
+    PerAxle {
+        front: axle(&tires.front, &direct.front, 0, peak.front.reached),
+        rear: axle(&tires.rear, &direct.rear, 4, peak.rear.reached),
+    }
+}
+
+fn signal_intervals(run: &Identification) -> SignalEstimates {
+    SignalEstimates::from_array(std::array::from_fn(|j| {
+        let value = run.direct.fit.parameters[SIGNALS + j];
+        Estimate::from_error(value, run.direct.signal_errors[j])
+    }))
+}
+
+/// Corrections of which the prior knew more than the data.
+fn weak_signals(run: &Identification) -> Vec<WeakSignal> {
+    (0..6)
+        .filter_map(|j| {
+            let prior_sigma = run.direct.signal_priors[j].sigma;
+            let error = run.direct.signal_errors[j].unwrap_or(prior_sigma);
+            let data_share = 1.0 - (error / prior_sigma).powi(2).min(1.0);
+            (data_share < WEAK_SHARE).then_some(WeakSignal {
+                name: NAMES[SIGNALS + j],
+                data_share,
+                prior_sigma,
+            })
+        })
+        .collect()
+}
+
+/// A speed within the range driven at which the straight-running car is unstable, if any.
+pub(crate) fn unstable_at_mps(
+    vehicle: &VehicleParameters,
+    tires: &PacejkaParameters,
+    speeds: &Range,
+) -> Option<f64> {
+    let grows = |v: f64| straight_line_growth_rate_1ps(vehicle, tires, v) > 0.0;
+    (speeds.high.is_finite() && grows(speeds.high))
+        .then(|| critical_speed_mps(vehicle, tires).unwrap_or(speeds.high))
+}

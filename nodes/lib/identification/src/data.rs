@@ -1,0 +1,158 @@
+//! Telemetry made ready for fitting: checked, cut into windows, and split into parts for fitting, choosing and judging.
+
+use gripsight_signals::{DataHealth, Segment, StateSequence, segments};
+use gripsight_vehicle::VehicleParameters;
+
+use crate::IdentificationError;
+use crate::shooting::{Window, tile};
+
+/// What a window is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// Parameters and weights are fitted to it.
+    Training,
+    /// Choices are made on it: when training stops, which of two sets is better.
+    Validation,
+    /// Nothing but the final judgement touches it.
+    Test,
+}
+
+/// Telemetry of a run.
+#[derive(Debug, Clone)]
+pub(crate) struct Data {
+    pub(crate) health: DataHealth,
+    pub(crate) segments: Vec<Segment>,
+    pub(crate) dt_s: f64,
+    /// Stretches in which the car moves all the time.
+    pub(crate) stretches: Vec<Window>,
+    /// Windows that tile the stretches, and the part of each.
+    pub(crate) windows: Vec<(Window, Part)>,
+    pub(crate) mean_speed_mps: f64,
+    /// Noise of v_y and yaw rate, from what neither car nor tire does that fast.
+    pub(crate) noise: [f64; 2],
+}
+
+/// Length of a window: several time constants of any car's lateral motion at speed.
+const WINDOW_S: f64 = 0.6;
+/// A window holds at least this many samples.
+const WINDOW_SAMPLES: usize = 12;
+/// Windows of one part lie together for this long, so that parts are not neighbours in everything.
+const BLOCK_S: f64 = 1.8;
+/// Parts of six blocks in a row.
+const PATTERN: [Part; 6] =
+    [Part::Training, Part::Training, Part::Validation, Part::Training, Part::Training, Part::Test];
+/// Slowest speed that counts, as a share of the median speed; slip angles mean little below.
+const SLOW_SHARE: f64 = 0.25;
+/// Slowest speed that counts in any case.
+const SLOW_MPS: f64 = 0.5;
+/// Fewest windows to fit anything to.
+const MIN_WINDOWS: usize = 12;
+
+impl Data {
+    /// # Errors
+    /// Telemetry that is malformed, frozen, too short, or of a car that stands.
+    pub(crate) fn new(
+        sequence: &StateSequence,
+        vehicle: &VehicleParameters,
+        health: &DataHealth,
+    ) -> Result<Self, IdentificationError> {
+        vehicle.clone().checked()?;
+        let used = ["v_x_mps", "v_y_mps", "yaw_rate_radps"];
+        if let Some(span) = health.frozen.iter().find(|span| used.contains(&span.channel)) {
+            return Err(IdentificationError::Frozen {
+                channel: span.channel,
+                from_s: span.from_s,
+                to_s: span.to_s,
+            });
+        }
+        let segments = segments(sequence, WINDOW_S)?;
+        let dt_s = segments.first().map_or(f64::NAN, |s| s.dt_s);
+        let len = ((WINDOW_S / dt_s).round() as usize).max(WINDOW_SAMPLES);
+        let mut speeds: Vec<f64> =
+            segments.iter().flat_map(|s| &s.v_x_mps).copied().filter(|&v| v > SLOW_MPS).collect();
+        let slow_mps = SLOW_MPS.max(SLOW_SHARE * median(&mut speeds).unwrap_or(0.0));
+        let stretches = moving_stretches(&segments, slow_mps, len);
+        let per_block = (BLOCK_S / (len as f64 * dt_s)).round().max(1.0) as usize;
+        let windows: Vec<(Window, Part)> = stretches
+            .iter()
+            .flat_map(|s| {
+                tile(&[s.len], len).into_iter().map(|w| Window {
+                    segment: s.segment,
+                    from: s.from + w.from,
+                    ..w
+                })
+            })
+            .enumerate()
+            .map(|(i, w)| (w, PATTERN[i / per_block % PATTERN.len()]))
+            .collect();
+        if windows.len() < MIN_WINDOWS {
+            return Err(IdentificationError::TooLittle {
+                what: "driving time in s without stops and gaps",
+                got: windows.len() as f64 * len as f64 * dt_s,
+                needed: MIN_WINDOWS as f64 * len as f64 * dt_s,
+                drive: "drive some laps without stopping",
+            });
+        }
+        let driven =
+            || windows.iter().flat_map(|(w, _)| &segments[w.segment].v_x_mps[w.from..w.from + w.len]);
+        let mean_speed_mps = driven().sum::<f64>() / driven().count() as f64;
+        let noise = [noise_of(&segments, |s| &s.v_y_mps), noise_of(&segments, |s| &s.yaw_rate_radps)];
+        Ok(Self { health: health.clone(), segments, dt_s, stretches, windows, mean_speed_mps, noise })
+    }
+
+    /// Windows of one part.
+    pub(crate) fn part(&self, part: Part) -> Vec<Window> {
+        self.windows.iter().filter(|(_, p)| *p == part).map(|(w, _)| *w).collect()
+    }
+
+    /// Samples of a channel over all windows.
+    pub(crate) fn samples<'a>(
+        &'a self,
+        channel: impl Fn(&'a Segment, usize) -> f64 + 'a,
+    ) -> impl Iterator<Item = f64> + 'a {
+        self.windows.iter().flat_map(move |(w, _)| {
+            let segment = &self.segments[w.segment];
+            let values: Vec<f64> = (w.from..w.from + w.len).map(|k| channel(segment, k)).collect();
+            values
+        })
+    }
+}
+
+/// Stretches of at least `min_len` samples above a speed.
+fn moving_stretches(segments: &[Segment], slow_mps: f64, min_len: usize) -> Vec<Window> {
+    let mut stretches = Vec::new();
+    for (segment, s) in segments.iter().enumerate() {
+        let mut from = 0;
+        for k in 0..=s.len() {
+            if k == s.len() || s.v_x_mps[k] <= slow_mps {
+                if k - from >= min_len {
+                    stretches.push(Window { segment, from, len: k - from });
+                }
+                from = k + 1;
+            }
+        }
+    }
+    stretches
+}
+
+/// Standard deviation of white noise on a channel, from its third differences (robust: by their median).
+fn noise_of<'a>(segments: &'a [Segment], channel: impl Fn(&'a Segment) -> &'a Vec<f64>) -> f64 {
+    let mut differences: Vec<f64> = segments
+        .iter()
+        .flat_map(|s| channel(s).windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()))
+        .collect();
+    // Var of a third difference of white noise is 20 times its own; the median of |x| is 0.6745 sigma.
+    median(&mut differences).unwrap_or(0.0) / 0.6745 / 20_f64.sqrt()
+}
+
+/// The median; `None` of nothing.
+pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
+    quantile(values, 0.5)
+}
+
+/// A quantile by the nearest rank; `None` of nothing.
+pub(crate) fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
+    let last = values.len().checked_sub(1)?;
+    let at = (share * last as f64).round() as usize;
+    Some(*values.select_nth_unstable_by(at.min(last), f64::total_cmp).1)
+}

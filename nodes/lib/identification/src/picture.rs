@@ -1,0 +1,108 @@
+//! What the report draws: tire curves with their band and the density of the data, and time series.
+
+use gripsight_vehicle::{MagicFormula, PacejkaParameters, SingleTrack};
+use nalgebra::{DMatrix, DVector};
+
+use crate::direct::Slips;
+use crate::judge::{best_starts, trajectory};
+use crate::rollout::{PARAMETERS, TireRollout, tires_of};
+use crate::shooting::{Rollout, Window};
+use crate::{Estimate, Identification, PerAxle, TireCurve, Trace};
+
+/// Points of a curve.
+const POINTS: usize = 60;
+/// A curve is drawn this much beyond the slips driven, at least to a slip of 0.2 rad.
+const BEYOND: f64 = 1.5;
+const AT_LEAST_RAD: f64 = 0.2;
+
+/// The curves of both axles.
+pub(crate) fn curves(run: &Identification, tires: &PacejkaParameters) -> PerAxle<TireCurve> {
+    let (slips, initial) = (&run.direct.slips, &run.initial);
+    PerAxle {
+        front: curve(run, &tires.front, &initial.front, &slips.front, 0),
+        rear: curve(run, &tires.rear, &initial.rear, &slips.rear, 4),
+    }
+}
+
+fn curve(
+    run: &Identification,
+    axle: &MagicFormula,
+    initial: &MagicFormula,
+    slips: &Slips,
+    offset: usize,
+) -> TireCurve {
+    let furthest = slips.range_rad.low.abs().max(slips.range_rad.high.abs());
+    let step = (BEYOND * furthest).max(AT_LEAST_RAD) / (POINTS - 1) as f64;
+    let slip_rad: Vec<f64> = (0..POINTS).map(|k| k as f64 * step).collect();
+    let mut density = vec![0; POINTS];
+    for slip in &slips.samples_rad {
+        if let Some(count) = density.get_mut((slip.abs() / step) as usize) {
+            *count += 1;
+        }
+    }
+    let covariance = run.direct.fit.covariance_of(&[offset, offset + 1, offset + 2, offset + 3]);
+    let half: Vec<f64> = slip_rad.iter().map(|&a| band(axle, a, covariance.as_ref())).collect();
+    let identified: Vec<f64> = slip_rad.iter().map(|&a| axle.normalized_force(a)).collect();
+    TireCurve {
+        initial: slip_rad.iter().map(|&a| initial.normalized_force(a)).collect(),
+        low: identified.iter().zip(&half).map(|(f, h)| f - h).collect(),
+        high: identified.iter().zip(&half).map(|(f, h)| f + h).collect(),
+        identified,
+        density,
+        slip_rad,
+    }
+}
+
+/// Half-width of the 90 % band of F_y/F_z at a slip, from the covariance of (k, C, D, E).
+fn band(axle: &MagicFormula, slip_rad: f64, covariance: Option<&DMatrix<f64>>) -> f64 {
+    let Some(covariance) = covariance else { return f64::NAN };
+    let at = [axle.normalized_stiffness(), axle.c, axle.d, axle.e];
+    let force =
+        |v: &[f64; 4]| MagicFormula::from_stiffness(v[0], v[1], v[2], v[3]).normalized_force(slip_rad);
+    let slope = DVector::from_fn(4, |j, _| {
+        let h = 1e-5 * at[j].abs().max(1e-2);
+        let moved = |by: f64| std::array::from_fn(|i| if i == j { at[i] + by } else { at[i] });
+        (force(&moved(h)) - force(&moved(-h))) / (2.0 * h)
+    });
+    Estimate::Z90 * (slope.transpose() * covariance * slope)[(0, 0)].max(0.0).sqrt()
+}
+
+/// Time series over all windows.
+pub(crate) fn trace(run: &Identification, before: &[f64; PARAMETERS], after: &[f64; PARAMETERS]) -> Trace {
+    let model = TireRollout { vehicle: &run.vehicle, segments: &run.data.segments };
+    let windows: Vec<Window> = run.data.windows.iter().map(|(w, _)| *w).collect();
+    let noise = run.direct.sigma;
+    let (starts_before, starts_after) =
+        (best_starts(&model, before, &windows, &noise), best_starts(&model, after, &windows, &noise));
+    let car = SingleTrack::new(&run.vehicle, &tires_of(after));
+    let mut trace = Trace::default();
+    let (mut old, mut new, mut states) = (Vec::new(), Vec::new(), Vec::new());
+    for ((window, start_before), start_after) in windows.iter().zip(starts_before).zip(starts_after) {
+        model.rollout(before, start_before, window, &mut old);
+        model.rollout(after, start_after, window, &mut new);
+        trajectory(&model, after, start_after, window, &mut states);
+        let s = &model.segments[window.segment];
+        for (i, k) in (window.from..window.from + window.len).enumerate() {
+            let next = (k + 1).min(s.len() - 1);
+            let before = k.saturating_sub(1);
+            let (front, rear) = car.slip_angles_rad(&states[i].0, &states[i].1);
+            trace.time_s.push(s.time_s(k));
+            trace.v_x_mps.push(s.v_x_mps[k]);
+            trace.a_y_mps2.push(s.v_x_mps[k] * s.yaw_rate_radps[k]);
+            trace
+                .a_x_mps2
+                .push((s.v_x_mps[next] - s.v_x_mps[before]) / ((next - before).max(1) as f64 * s.dt_s));
+            trace.x_m.extend(s.x_m.get(k));
+            trace.y_m.extend(s.y_m.get(k));
+            trace.slip_rad.front.push(front);
+            trace.slip_rad.rear.push(rear);
+            trace.v_y_mps.push(s.v_y_mps[k]);
+            trace.v_y_before_mps.push(old[2 * i]);
+            trace.v_y_after_mps.push(new[2 * i]);
+            trace.yaw_rate_radps.push(s.yaw_rate_radps[k]);
+            trace.yaw_rate_before_radps.push(old[2 * i + 1]);
+            trace.yaw_rate_after_radps.push(new[2 * i + 1]);
+        }
+    }
+    trace
+}
