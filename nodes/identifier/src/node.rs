@@ -184,7 +184,7 @@ async fn identify_each(
             models: &mut models,
             on_step: &|text| facts.borrow_mut().running = Some(text.to_owned()),
         };
-        let result = run.to_end().await;
+        let result = run.finish().await;
         if let Ok(outcome) = &result {
             outputs.conclude(outcome, &sequence).await;
             log(outcome);

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use gripsight_bag::identification_messages as messages;
 use gripsight_identification::{
     AcceptedSet, Candidate, Config, FrictionPrior, Identification, IdentificationError, Next, Outcome,
-    ResidualModel, RunKey,
+    ResidualModel, RunKey, Started,
 };
 use gripsight_msgs::{IdentificationProgress as Progress, ResidualModel as ModelMessage};
 use gripsight_runtime::Subscription;
@@ -48,37 +48,44 @@ pub(crate) struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Runs to the end.
-    pub(crate) async fn to_end(mut self) -> Result<Outcome, RunError> {
+    /// Asks, fits and repeats until an outcome stands.
+    pub(crate) async fn finish(mut self) -> Result<Outcome, RunError> {
         let start = Instant::now();
         let (sequence, vehicle) = (Arc::clone(&self.sequence), Arc::clone(&self.vehicle));
         let (prior, previous, config) = (self.prior, self.previous.clone(), self.config.clone());
-        let (mut identification, mut candidate) = tokio::task::spawn_blocking(move || {
+        let started = tokio::task::spawn_blocking(move || {
             Identification::start(&sequence, &vehicle, prior, previous.as_ref(), &config)
         })
         .await??;
+        let mut identification = match started {
+            Started::Running(run) => run,
+            Started::Refused(outcome) => return Ok(*outcome),
+        };
+        let mut next = identification.candidate().cloned().map(Next::Candidate);
         loop {
+            let candidate = match next {
+                Some(Next::Candidate(candidate)) => candidate,
+                Some(Next::Done(outcome)) => {
+                    let text = if outcome.accepted { "accepted" } else { "rejected" };
+                    self.step(&outcome.key, Progress::FINISHED, &identification, start, text.to_owned())
+                        .await;
+                    return Ok(*outcome);
+                }
+                None => return Err(IdentificationError::Ended.into()),
+            };
             let iteration = candidate.key.iteration + 1;
             let text = format!("iteration {iteration}: learning the residual");
             self.step(&candidate.key, Progress::TRAINING, &identification, start, text).await;
             let model = self.model_for(&candidate).await?;
             let text = format!("iteration {iteration}: virtual test and fit");
             self.step(&candidate.key, Progress::FITTING, &identification, start, text).await;
-            let next = tokio::task::spawn_blocking(move || {
+            let (back, advanced) = tokio::task::spawn_blocking(move || {
                 let next = identification.advance(&model);
                 (identification, next)
             })
             .await?;
-            identification = next.0;
-            match next.1? {
-                Next::Candidate(another) => candidate = another,
-                Next::Done(outcome) => {
-                    let text = if outcome.accepted { "accepted" } else { "rejected" };
-                    self.step(&outcome.key, Progress::FINISHED, &identification, start, text.to_owned())
-                        .await;
-                    return Ok(*outcome);
-                }
-            }
+            identification = back;
+            next = Some(advanced?);
         }
     }
 

@@ -149,6 +149,12 @@ impl Identification {
         (!self.ended).then_some(&self.candidate)
     }
 
+    /// The turns taken so far.
+    #[must_use]
+    pub fn history(&self) -> &[IterationRecord] {
+        &self.history
+    }
+
     /// Takes the residual model of the waiting candidate: drives the virtual test, fits the tires, and asks for the next or ends.
     ///
     /// # Errors
