@@ -1,1 +1,21 @@
 //! Pages and pictures: the one look of every gripsight report.
+//!
+//! A page is one HTML file without scripts or references: it opens from a USB stick and prints on two sheets. Pictures are SVG
+//! inside it. Colours have fixed [`Role`]s in every picture.
+//!
+//! [`identification_page`] shows the result of an identification. The pages are built of [`Chart`]s, bars and tables; nothing here computes what is
+//! not only for the eye.
+
+mod bars;
+mod chart;
+mod error;
+mod identification;
+mod page;
+mod role;
+mod text;
+
+pub use chart::{Axis, Chart, Layer};
+pub use error::ReportError;
+pub use identification::{IdentificationInput, identification_page};
+pub use page::Header;
+pub use role::Role;

@@ -1,0 +1,111 @@
+//! The page of an identification.
+
+mod pictures;
+mod tables;
+
+use gripsight_identification::{Method, Outcome, PerAxle, Source};
+use maud::html;
+
+use crate::page::{Tone, figure, list, page, section};
+use crate::text::{fixed, significant, with_interval};
+use crate::{Header, ReportError};
+
+/// What the page of an identification shows.
+#[derive(Debug, Clone, Copy)]
+pub struct IdentificationInput<'a> {
+    /// What was found.
+    pub outcome: &'a Outcome,
+    /// The head of the page.
+    pub header: &'a Header,
+    /// Points (|slip angle| in rad, |F_y|/F_z) of the true tires, in order of slip, where a simulator knows them.
+    pub truth: Option<&'a PerAxle<Vec<(f64, f64)>>>,
+    /// What reading the data met, a sentence each.
+    pub data_notes: &'a [String],
+}
+
+/// The page of an identification, as one HTML file.
+///
+/// # Errors
+/// [`ReportError::Drawing`].
+pub fn identification_page(input: &IdentificationInput<'_>) -> Result<String, ReportError> {
+    let outcome = input.outcome;
+    let [front, rear] = pictures::tire_curves(input);
+    let [v_y, yaw_rate] = pictures::worst_seconds(outcome);
+    let worst = format!(
+        "{} s of the drive where the model misses most; rollouts start anew from the measured state every {} s.",
+        pictures::WORST_S,
+        significant(outcome.rmse.horizon_s, 2)
+    );
+    let body = html! {
+        (section("Front tires", false, &figure(&front, "")?))
+        (section("Rear tires", false, &figure(&rear, "")?))
+        (section("Tires found", false, &tables::tires(outcome)))
+        (section("Taken out of the signals", false, &tables::signals(outcome)))
+        (section("What limits the result", false, &list(&outcome.reasons, "Nothing that was found.")))
+        (section("Drive next", false, &list(&outcome.drive_next, "Nothing in particular: the data tell what was asked.")))
+        (section("Lateral velocity, worst seconds", false, &figure(&v_y, "")?))
+        (section("Yaw rate, worst seconds", false, &figure(&yaw_rate, &worst)?))
+        (section("Error along the drive", true, &html! {
+            div.pair {
+                @for chart in &pictures::residuals(outcome) { (figure(chart, "")?) }
+            }
+        }))
+        (section("Rollout error over horizon, held-out data", false, &figure(&pictures::horizon(outcome), "")?))
+        (section("Lateral and forward acceleration", false, &figure(&pictures::accelerations(outcome), "")?))
+        (section("Held-out errors", false, &tables::errors(outcome)))
+        (section("Data", false, &tables::health(outcome, input.data_notes)))
+        (section("Turns of the loop", true, &html! {
+            p { (how(outcome)) }
+            (tables::iterations(outcome))
+        }))
+    };
+    let tone = if outcome.accepted { Tone::Good } else { Tone::Caution };
+    Ok(page("Tire identification", tone, &verdict(outcome), input.header, &body))
+}
+
+/// The first line: use it or not, and the two figures that matter.
+fn verdict(outcome: &Outcome) -> String {
+    let start = match outcome.reasons.first() {
+        _ if outcome.accepted => "Accepted".to_owned(),
+        Some(reason) => format!("Not accepted: {reason}"),
+        None => "Not accepted".to_owned(),
+    };
+    let stiffness = outcome.cornering_stiffness_n_per_rad;
+    let stiffness = stiffness.map(|k| significant(k.value, 3));
+    let grip = outcome.peak_friction.map(|p| {
+        let (value, interval) = with_interval(p.value, p.low, p.high);
+        match (p.reached, p.from_prior) {
+            (true, _) => format!("{value} ({interval})"),
+            (false, true) => format!("{} from the prior, peak not reached", fixed(p.value, 2)),
+            (false, false) => "unknown, peak not reached".to_owned(),
+        }
+    });
+    let grip = if grip.front == grip.rear {
+        format!("{} front and rear", grip.front)
+    } else {
+        format!("front {}, rear {}", grip.front, grip.rear)
+    };
+    format!(
+        "{start}. Peak friction {grip}; cornering stiffness front {}, rear {} N/rad.",
+        stiffness.front, stiffness.rear
+    )
+}
+
+/// One sentence on the way to the result.
+fn how(outcome: &Outcome) -> String {
+    let method = match outcome.config.method {
+        Method::Paper => "the paper's procedure",
+        Method::Robust => "the robust procedure",
+    };
+    let source = match outcome.source {
+        Source::Start => "the start: nothing was fitted",
+        Source::LeastSquares => "the direct least-squares fit",
+        Source::ResidualLoop => "the residual loop",
+    };
+    let turns = outcome.iterations;
+    let end = if outcome.converged { "converged" } else { "not converged" };
+    let network = outcome.config.residual.name();
+    format!(
+        "Method: {method}, residual network {network}; {turns} turns, {end}. The tires above come from {source}."
+    )
+}

@@ -1,0 +1,156 @@
+//! The tables of an identification.
+
+use gripsight_identification::{Estimate, Outcome, PeakFriction, Range};
+use maud::{Markup, html};
+
+use crate::page::{list, table};
+use crate::text::{fixed, interval, percent, significant, with_interval};
+
+/// Parameters, stiffness, grip and slip visited.
+pub(super) fn tires(outcome: &Outcome) -> Markup {
+    let bound = |name: &str, value: f64| {
+        let flag = if outcome.on_bound.iter().any(|b| b == name) { " on its bound" } else { "" };
+        format!("{}{flag}", significant(value, 3))
+    };
+    let (f, r) = (&outcome.phi_p.front, &outcome.phi_p.rear);
+    let letter = |name: &str, letter: &str, front: f64, rear: f64| {
+        [name.to_owned(), bound(&format!("front.{letter}"), front), bound(&format!("rear.{letter}"), rear)]
+    };
+    let estimate = |e: &Estimate| {
+        let (value, interval) = with_interval(e.value, e.low, e.high);
+        format!("{value} ({interval})")
+    };
+    let peak = |p: &PeakFriction| {
+        let (value, interval) = with_interval(p.value, p.low, p.high);
+        match (p.reached, p.from_prior) {
+            (true, _) => format!("{value} ({interval})"),
+            (false, true) => format!("{} from prior", fixed(p.value, 2)),
+            (false, false) => "peak not reached".to_owned(),
+        }
+    };
+    let slip = |r: &Range| format!("{}°", interval(r.low.to_degrees(), r.high.to_degrees()));
+    let stiffness = &outcome.cornering_stiffness_n_per_rad;
+    table(
+        ["", "Front", "Rear"],
+        &[
+            ["Cornering stiffness / (N/rad)".into(), estimate(&stiffness.front), estimate(&stiffness.rear)],
+            ["Peak friction".into(), peak(&outcome.peak_friction.front), peak(&outcome.peak_friction.rear)],
+            ["Slip visited".into(), slip(&outcome.slip_range_rad.front), slip(&outcome.slip_range_rad.rear)],
+            letter("B / (1/rad)", "b", f.b, r.b),
+            letter("C", "c", f.c, r.c),
+            letter("D", "d", f.d, r.d),
+            letter("E", "e", f.e, r.e),
+        ],
+    )
+}
+
+/// Corrections with intervals; angles in the units of the files.
+pub(super) fn signals(outcome: &Outcome) -> Markup {
+    let s = &outcome.signal_intervals;
+    let rows = [
+        ("Steering delay / s", "steering_delay_s", s.steering_delay_s),
+        ("Steering gain", "steering_gain", s.steering_gain),
+        ("Steering offset / rad", "steering_offset_rad", s.steering_offset_rad),
+        ("v_y measured ahead of the CoG / m", "v_y_lever_arm_m", s.v_y_lever_arm_m),
+        ("v_y bias / (m/s)", "v_y_bias_mps", s.v_y_bias_mps),
+        ("Yaw rate bias / (rad/s)", "yaw_rate_bias_radps", s.yaw_rate_bias_radps),
+    ]
+    .map(|(title, name, e)| {
+        let (value, interval) = with_interval(e.value, e.low, e.high);
+        let weak = outcome.weak_signals.iter().find(|w| w.name == name);
+        let rests = weak.map_or_else(
+            || "data".to_owned(),
+            |w| format!("data {}, assumption {}", percent(w.data_share), percent(1.0 - w.data_share)),
+        );
+        [title.to_owned(), value, interval, rests]
+    });
+    table(["", "Value", "90 %", "Rests on"], &rows)
+}
+
+/// Errors before and after.
+pub(super) fn errors(outcome: &Outcome) -> Markup {
+    let r = &outcome.rmse;
+    let row = |name: String, before: f64, after: f64| {
+        let gain = if before > 0.0 { percent(after / before - 1.0) } else { String::new() };
+        [name, significant(before, 3), significant(after, 3), gain]
+    };
+    let horizon = significant(r.horizon_s, 2);
+    let noise = |k: usize| significant(r.noise[k], 2);
+    html! {
+        (table(["RMS error", "Before", "After", "Change"], &[
+            row("One step, over noise".into(), r.one_step.before, r.one_step.after),
+            row("One step, v_y / (m/s)".into(), r.one_step.v_y_mps.before, r.one_step.v_y_mps.after),
+            row("One step, yaw rate / (rad/s)".into(), r.one_step.yaw_rate_radps.before, r.one_step.yaw_rate_radps.after),
+            row(format!("{horizon} s, over noise"), r.rollout.before, r.rollout.after),
+            row(format!("{horizon} s, v_y / (m/s)"), r.rollout.v_y_mps.before, r.rollout.v_y_mps.after),
+            row(format!("{horizon} s, yaw rate / (rad/s)"), r.rollout.yaw_rate_radps.before, r.rollout.yaw_rate_radps.after),
+        ]))
+        p { "Before: start tires, signals as recorded. After: tires found, signals corrected. Noise: v_y " (noise(0)) " m/s, yaw rate " (noise(1)) " rad/s." }
+    }
+}
+
+/// What the data are like.
+pub(super) fn health(outcome: &Outcome, notes: &[String]) -> Markup {
+    let h = &outcome.health;
+    let longest_s = h.gaps.iter().map(|g| g.to_s - g.from_s).fold(0.0, f64::max);
+    let gaps = if h.gaps.is_empty() {
+        "none".to_owned()
+    } else {
+        format!("{}, longest {} s", h.gaps.len(), significant(longest_s, 2))
+    };
+    let frozen = if h.frozen.is_empty() {
+        "none".to_owned()
+    } else {
+        h.frozen
+            .iter()
+            .map(|f| format!("{} {}–{} s", f.channel, fixed(f.from_s, 1), fixed(f.to_s, 1)))
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    let recorded = if h.recorded.is_empty() { "nothing".to_owned() } else { h.recorded.join(", ") };
+    let speeds = &outcome.v_x_range_mps;
+    html! {
+        (table(["", ""], &[
+            ["Samples".into(), format!("{} at {} Hz, jitter {} ms", h.samples, significant(h.rate_hz, 3), significant(1000.0 * h.jitter_s, 2))],
+            ["Duration".into(), format!("{} s, moving {}", fixed(h.duration_s, 1), percent(h.moving_share))],
+            ["Speed".into(), format!("{} … {} m/s, mean {} m/s", fixed(speeds.low, 1), fixed(speeds.high, 1), fixed(outcome.mean_speed_mps, 1))],
+            ["Pauses".into(), gaps],
+            ["Frozen channels".into(), frozen],
+            ["Recorded beside the needed".into(), recorded],
+        ]))
+        @if !notes.is_empty() { (list(notes, "")) }
+    }
+}
+
+/// Turn by turn.
+pub(super) fn iterations(outcome: &Outcome) -> Markup {
+    let rows: Vec<[String; 8]> = outcome
+        .history
+        .iter()
+        .map(|i| {
+            [
+                i.iteration.to_string(),
+                percent(i.change),
+                significant(i.validation_rmse, 3),
+                significant(i.fit_rmse, 2),
+                format!("{} m/s", fixed(i.sweep_speed_mps, 1)),
+                percent(i.extrapolated_share),
+                i.epochs.to_string(),
+                significant(i.residual_loss, 3),
+            ]
+        })
+        .collect();
+    table(
+        [
+            "Turn",
+            "Change of the curves",
+            "Held-out error",
+            "Fit error",
+            "Sweep speed",
+            "Extrapolated",
+            "Epochs",
+            "Residual loss",
+        ],
+        &rows,
+    )
+}
