@@ -103,3 +103,18 @@ fn a_reset_state_is_a_new_one() {
         assert_eq!(first, again);
     }
 }
+
+#[test]
+fn a_step_allocates_nothing() {
+    for architecture in ARCHITECTURES {
+        let network = ResidualNetwork::new(small(architecture), normalization(3, 2), 3).unwrap();
+        let mut state = network.stream_state();
+        let mut output = [0.0; 2];
+        let counted = allocation_counter::measure(|| {
+            for _ in 0..10 {
+                network.step(&mut state, &[1.0, -1.0, 0.5], &mut output).unwrap();
+            }
+        });
+        assert_eq!(counted.count_total, 0, "{architecture:?}");
+    }
+}
