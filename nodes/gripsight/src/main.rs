@@ -3,6 +3,7 @@
 //! Standard output holds results, standard error progress and logs. Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but the
 //! result is not accepted (or not identifiable).
 
+mod bag;
 mod simulate;
 
 use std::process::ExitCode;
@@ -25,6 +26,7 @@ Results go to standard output, progress and logs to standard error; RUST_LOG=deb
 #[derive(Debug, Subcommand)]
 enum Command {
     Simulate(simulate::SimulateArgs),
+    Bag(bag::BagArgs),
 }
 
 /// How a subcommand ended that did not fail.
@@ -60,5 +62,6 @@ fn main() -> ExitCode {
 fn run(command: Command) -> anyhow::Result<Outcome> {
     match command {
         Command::Simulate(args) => simulate::run(&args),
+        Command::Bag(args) => bag::run(&args),
     }
 }

@@ -17,7 +17,7 @@
 //! | `odometry_delay` | T s | v_y(t - T), linear between samples, the first value before them; v_y alone, as where a filter makes it |
 //! | `odometry_low_pass` | tau s | tau y' + y = v_y, v_y linear between samples, y = v_y at the first |
 //! | `v_x_scale` | s | (1 + s) v_x of the odometry |
-//! | `imu_lever_arm` | x,y m | a_y + x r' - y r^2, r the unit's own, r' by central differences |
+//! | `imu_lever_arm` | x_m, y_m | a_y + x r' - y r^2, r the unit's own, r' by central differences |
 //! | `imu_tilt` | phi rad | a_y cos phi + g sin phi |
 //!
 //! Signs and equations: the table of candidate effects, where these are the actuator's and the sensors'.
@@ -114,58 +114,71 @@ pub enum Effect {
     },
 }
 
-/// Every effect that can be injected.
-pub const EFFECTS: [&str; 13] = [
-    "steering_delay",
-    "steering_gain",
-    "steering_offset",
-    "steering_lag",
-    "gyro_scale",
-    "gyro_bias",
-    "v_y_lever_arm",
-    "v_y_bias",
-    "odometry_delay",
-    "odometry_low_pass",
-    "v_x_scale",
-    "imu_lever_arm",
-    "imu_tilt",
+/// Every effect that can be injected, with its parameters.
+pub const EFFECTS: [(&str, &[&str]); 13] = [
+    ("steering_delay", &["delay_s"]),
+    ("steering_gain", &["gain"]),
+    ("steering_offset", &["offset_rad"]),
+    ("steering_lag", &["tau_s"]),
+    ("gyro_scale", &["scale"]),
+    ("gyro_bias", &["bias_radps"]),
+    ("v_y_lever_arm", &["x_m"]),
+    ("v_y_bias", &["bias_mps"]),
+    ("odometry_delay", &["delay_s"]),
+    ("odometry_low_pass", &["tau_s"]),
+    ("v_x_scale", &["scale"]),
+    ("imu_lever_arm", &["x_m", "y_m"]),
+    ("imu_tilt", &["roll_rad"]),
 ];
 
 impl FromStr for Effect {
     type Err = BagError;
 
-    /// Reads `NAME=VALUE`, SI units; `imu_lever_arm=X,Y`.
+    /// Reads `NAME=VALUE` or `NAME=PARAMETER:VALUE,PARAMETER:VALUE`, SI units; a parameter not named is zero.
     fn from_str(given: &str) -> Result<Self, BagError> {
         let refuse = |why: String| BagError::Effect { given: given.to_owned(), why };
-        let (name, value) = given.split_once('=').ok_or_else(|| refuse("expected NAME=VALUE".to_owned()))?;
-        let numbers: Vec<f64> = value
-            .split(',')
-            .map(|v| v.trim().parse::<f64>().ok().filter(|v| v.is_finite()))
-            .collect::<Option<_>>()
-            .ok_or_else(|| refuse(format!("`{value}` is no finite number")))?;
-        let effect = match (name, &numbers[..]) {
-            ("steering_delay", &[delay_s]) => Self::SteeringDelay { delay_s },
-            ("steering_gain", &[gain]) => Self::SteeringGain { gain },
-            ("steering_offset", &[offset_rad]) => Self::SteeringOffset { offset_rad },
-            ("steering_lag", &[tau_s]) => Self::SteeringLag { tau_s },
-            ("gyro_scale", &[scale]) => Self::GyroScale { scale },
-            ("gyro_bias", &[bias_radps]) => Self::GyroBias { bias_radps },
-            ("v_y_lever_arm", &[x_m]) => Self::LateralVelocityLeverArm { x_m },
-            ("v_y_bias", &[bias_mps]) => Self::LateralVelocityBias { bias_mps },
-            ("odometry_delay", &[delay_s]) => Self::OdometryDelay { delay_s },
-            ("odometry_low_pass", &[tau_s]) => Self::OdometryLowPass { tau_s },
-            ("v_x_scale", &[scale]) => Self::ForwardVelocityScale { scale },
-            ("imu_lever_arm", &[x_m, y_m]) => Self::ImuLeverArm { x_m, y_m },
-            ("imu_tilt", &[roll_rad]) => Self::ImuTilt { roll_rad },
-            (known, _) if EFFECTS.contains(&known) => {
-                let values = if known == "imu_lever_arm" { "two values, X,Y" } else { "one value" };
-                return Err(refuse(format!("takes {values}")));
-            }
-            _ => return Err(refuse(format!("can be injected: {}", EFFECTS.join(", ")))),
+        let (name, values) = given.split_once('=').ok_or_else(|| refuse("expected NAME=VALUE".to_owned()))?;
+        let Some((_, parameters)) = EFFECTS.iter().find(|(known, _)| *known == name) else {
+            let names = EFFECTS.map(|(name, _)| name).join(", ");
+            return Err(refuse(format!("can be injected: {names}")));
+        };
+        let [a, b] = parse_values(values, parameters).map_err(refuse)?;
+        let effect = match name {
+            "steering_delay" => Self::SteeringDelay { delay_s: a },
+            "steering_gain" => Self::SteeringGain { gain: a },
+            "steering_offset" => Self::SteeringOffset { offset_rad: a },
+            "steering_lag" => Self::SteeringLag { tau_s: a },
+            "gyro_scale" => Self::GyroScale { scale: a },
+            "gyro_bias" => Self::GyroBias { bias_radps: a },
+            "v_y_lever_arm" => Self::LateralVelocityLeverArm { x_m: a },
+            "v_y_bias" => Self::LateralVelocityBias { bias_mps: a },
+            "odometry_delay" => Self::OdometryDelay { delay_s: a },
+            "odometry_low_pass" => Self::OdometryLowPass { tau_s: a },
+            "v_x_scale" => Self::ForwardVelocityScale { scale: a },
+            "imu_lever_arm" => Self::ImuLeverArm { x_m: a, y_m: b },
+            _ => Self::ImuTilt { roll_rad: a },
         };
         effect.check().map_err(refuse)?;
         Ok(effect)
     }
+}
+
+/// Reads `VALUE` or `PARAMETER:VALUE`, separated by commas.
+fn parse_values(text: &str, parameters: &[&str]) -> Result<[f64; 2], String> {
+    let mut values = [0.0; 2];
+    for (place, item) in text.split(',').enumerate() {
+        let (place, number) = match item.split_once(':') {
+            Some((parameter, number)) => (parameters.iter().position(|p| *p == parameter.trim()), number),
+            None => (Some(place), item),
+        };
+        let slot = place.filter(|&place| place < parameters.len()).and_then(|place| values.get_mut(place));
+        let slot = slot.ok_or_else(|| format!("takes {}", parameters.join(" and ")))?;
+        *slot = match number.trim().parse::<f64>() {
+            Ok(number) if number.is_finite() => number,
+            _ => return Err(format!("`{number}` is no finite number")),
+        };
+    }
+    Ok(values)
 }
 
 impl Effect {
@@ -388,7 +401,7 @@ mod tests {
         let [arm, v_y_bias] = [odometry("v_y_lever_arm=0.4"), odometry("v_y_bias=0.1")];
         let [v_x, late] = [odometry("v_x_scale=-0.03"), odometry("odometry_delay=0.035")];
         let tilted = with("imu_tilt=0.03").imu;
-        let moved = with("imu_lever_arm=0.2,0.1").imu;
+        let moved = with("imu_lever_arm=x_m:0.2,y_m:0.1").imu;
         for (k, m) in truth.odometry.iter().enumerate() {
             assert_eq!(scale[k].yaw_rate_radps, 1.05 * m.yaw_rate_radps);
             assert_eq!(bias[k].yaw_rate_radps, m.yaw_rate_radps + 0.01);
@@ -426,9 +439,8 @@ mod tests {
 
     #[test]
     fn nothing_else_changes_and_the_null_value_changes_nothing() {
-        for name in EFFECTS {
-            let null = if name == "imu_lever_arm" { "0,0" } else { "0" };
-            assert_eq!(with(&format!("{name}={null}")), series(), "{name}");
+        for (name, _) in EFFECTS {
+            assert_eq!(with(&format!("{name}=0")), series(), "{name}");
         }
         let changed = with("v_y_bias=0.1");
         assert_eq!((changed.drive, changed.imu), (series().drive, series().imu));
@@ -444,7 +456,8 @@ mod tests {
             "steering_lag=-1",
             "steering_gain=-1",
             "v_x_scale=-2",
-            "imu_lever_arm=0.1",
+            "imu_lever_arm=z_m:0.1",
+            "imu_lever_arm=1,2,3",
             "imu_tilt=1,2",
             "tire_wear=0.1",
         ] {

@@ -1,0 +1,176 @@
+//! `gripsight bag`: looks into bags, rewrites damaged ones, and injects known effects.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Subcommand};
+use gripsight_bag::effect::{EFFECTS, Effect};
+use gripsight_bag::{BagInfo, ReadReport, Role, TopicMap, Usable};
+use gripsight_signals::DataHealth;
+
+use crate::Outcome;
+
+/// Look into a bag, rewrite a damaged one, or inject a known effect.
+#[derive(Debug, Args)]
+pub(crate) struct BagArgs {
+    #[command(subcommand)]
+    command: BagCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum BagCommand {
+    /// Show topics, rates, gaps, and what the suite would use of a bag.
+    Info {
+        /// An .mcap file or a rosbag2 folder.
+        bag: PathBuf,
+        /// A file that maps names to topics, such as `odom: /car_state/odom`; without it topics are found by type.
+        #[arg(long, value_name = "FILE")]
+        topics: Option<PathBuf>,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Rewrite a cut-off or damaged bag up to its last whole message.
+    Recover {
+        /// An .mcap file or a rosbag2 folder.
+        bag: PathBuf,
+        /// The bag to write; <stem>.recovered.mcap beside BAG by default.
+        #[arg(long, value_name = "BAG")]
+        out: Option<PathBuf>,
+    },
+    /// Write a recorded bag as it would be with a known sensor or actuator effect; everything else in it stays.
+    #[command(after_help = effects_help())]
+    Inject {
+        /// An .mcap file or a rosbag2 folder.
+        bag: PathBuf,
+        /// An effect: NAME=VALUE, or NAME=PARAMETER:VALUE,PARAMETER:VALUE. May be repeated; applied in this order.
+        #[arg(long = "effect", value_name = "NAME=VALUE", required = true)]
+        effects: Vec<Effect>,
+        /// A file that maps names to topics.
+        #[arg(long, value_name = "FILE")]
+        topics: Option<PathBuf>,
+        /// The bag to write.
+        #[arg(long, value_name = "BAG")]
+        out: PathBuf,
+    },
+}
+
+fn effects_help() -> String {
+    let list = EFFECTS.map(|(name, parameters)| format!("  {name:<18} {}", parameters.join(", ")));
+    format!("Effects and their parameters:\n{}", list.join("\n"))
+}
+
+pub(crate) fn run(args: &BagArgs) -> anyhow::Result<Outcome> {
+    match &args.command {
+        BagCommand::Info { bag, topics, json } => {
+            let info = gripsight_bag::info(bag, &topic_map(topics.as_deref())?)?;
+            if *json {
+                println!("{}", serde_json::to_string_pretty(&info)?);
+            } else {
+                print!("{}", table(bag, &info));
+            }
+        }
+        BagCommand::Recover { bag, out } => {
+            let out = out.clone().unwrap_or_else(|| bag.with_extension("recovered.mcap"));
+            let recovered = gripsight_bag::recover(bag, &out)?;
+            for damage in &recovered.damage {
+                tracing::warn!("{damage}");
+            }
+            println!("{}: {} messages", out.display(), recovered.messages);
+        }
+        BagCommand::Inject { bag, effects, topics, out } => {
+            let changed = gripsight_bag::inject(bag, &topic_map(topics.as_deref())?, effects, out)?;
+            println!("{}: {changed} messages changed", out.display());
+        }
+    }
+    Ok(Outcome::Done)
+}
+
+fn topic_map(file: Option<&Path>) -> anyhow::Result<TopicMap> {
+    Ok(file.map(TopicMap::read).transpose()?.unwrap_or_default())
+}
+
+/// What `info` prints for people.
+fn table(bag: &Path, info: &BagInfo) -> String {
+    let mut text = format!(
+        "{}: {:.2} MB, {:.1} s, {} messages\n",
+        bag.display(),
+        info.size_bytes as f64 * 1e-6,
+        info.duration_s,
+        info.messages
+    );
+    text.extend(info.damage.iter().map(|damage| format!("damaged: {damage}\n")));
+    let width =
+        |f: fn(&gripsight_bag::TopicInfo) -> usize| info.topics.iter().map(f).max().unwrap_or(0).max(5);
+    let (names, types) = (width(|t| t.name.len()), width(|t| t.type_name.len()));
+    let _ = writeln!(
+        text,
+        "\n{:names$}  {:types$}  {:>8}  {:>8}  {:>5}  {:>14}",
+        "topic", "type", "messages", "rate Hz", "gaps", "longest step s"
+    );
+    for t in &info.topics {
+        let _ = writeln!(
+            text,
+            "{:names$}  {:types$}  {:>8}  {:>8.2}  {:>5}  {:>14.3}",
+            t.name, t.type_name, t.messages, t.rate_hz, t.gaps, t.longest_step_s
+        );
+    }
+    match &info.telemetry {
+        Usable::Nothing(why) => {
+            let _ = writeln!(text, "\nnot usable for identification: {why}");
+        }
+        Usable::Sequences { report, health } => {
+            text.push_str(&usable(report));
+            text.extend(health.iter().map(health_lines));
+        }
+    }
+    text
+}
+
+fn usable(report: &ReadReport) -> String {
+    if let Some(topic) = &report.recorded_sequences {
+        return format!("\nused: the state sequences recorded on {topic}\n");
+    }
+    let mut text = "\nused as\n".to_owned();
+    for role in Role::ALL {
+        let topic = report.streams.topic(role).unwrap_or("not recorded");
+        let _ = writeln!(text, "  {:7} {topic}", role.name());
+    }
+    for (count, what) in [
+        (
+            report.without_content,
+            "messages say nothing: joints that are not the four wheels, or not measured",
+        ),
+        (report.without_drive, "odometry messages left out: no drive command in force"),
+        (report.duplicates, "messages left out: a stamp seen before"),
+    ] {
+        if count > 0 {
+            let _ = writeln!(text, "  {count} {what}");
+        }
+    }
+    text
+}
+
+fn health_lines(health: &DataHealth) -> String {
+    let mut text = format!(
+        "\n{} samples over {:.1} s at {:.2} Hz, jitter {:.1} ms, moving {:.0} % of the time\n  channels: {}\n",
+        health.samples,
+        health.duration_s,
+        health.rate_hz,
+        1e3 * health.jitter_s,
+        100.0 * health.moving_share,
+        if health.recorded.is_empty() {
+            "the required ones only".to_owned()
+        } else {
+            health.recorded.join(", ")
+        }
+    );
+    for gap in &health.gaps {
+        let _ = writeln!(text, "  gap from {:.2} s to {:.2} s", gap.from_s, gap.to_s);
+    }
+    for span in &health.frozen {
+        let _ =
+            writeln!(text, "  {} stands still from {:.2} s to {:.2} s", span.channel, span.from_s, span.to_s);
+    }
+    text
+}
