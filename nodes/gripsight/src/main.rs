@@ -4,6 +4,10 @@
 //! result is not accepted (or not identifiable).
 
 mod bag;
+mod camera;
+mod friction;
+mod identify;
+mod invocation;
 mod simulate;
 
 use std::process::ExitCode;
@@ -25,6 +29,8 @@ Results go to standard output, progress and logs to standard error; RUST_LOG=deb
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Identify(identify::IdentifyArgs),
+    Friction(friction::FrictionArgs),
     Simulate(simulate::SimulateArgs),
     Bag(bag::BagArgs),
 }
@@ -61,6 +67,8 @@ fn main() -> ExitCode {
 
 fn run(command: Command) -> anyhow::Result<Outcome> {
     match command {
+        Command::Identify(args) => identify::run(&args),
+        Command::Friction(args) => friction::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Bag(args) => bag::run(&args),
     }

@@ -12,7 +12,7 @@ mod error;
 mod identification;
 mod page;
 mod role;
-mod text;
+pub mod text;
 
 pub use chart::{Axis, Chart, Layer};
 pub use error::ReportError;

@@ -1,10 +1,11 @@
-//! Numbers as people read them.
+//! Numbers as people read them, on pages and on the terminal.
 
 /// A dash where there is nothing to say.
 const NOTHING: &str = "–";
 
 /// A number with so many significant digits, without an exponent; a dash where it is not finite.
-pub(crate) fn significant(value: f64, digits: usize) -> String {
+#[must_use]
+pub fn significant(value: f64, digits: usize) -> String {
     if !value.is_finite() {
         return NOTHING.into();
     }
@@ -25,12 +26,14 @@ fn decimals(magnitude: f64, digits: usize) -> usize {
 }
 
 /// With a fixed number of decimals; a dash where it is not finite.
-pub(crate) fn fixed(value: f64, decimals: usize) -> String {
+#[must_use]
+pub fn fixed(value: f64, decimals: usize) -> String {
     if value.is_finite() { minus(format!("{value:.decimals$}")) } else { NOTHING.into() }
 }
 
 /// "low … high", with the decimals that the interval's width deserves; a dash where an end is not finite.
-pub(crate) fn interval(low: f64, high: f64) -> String {
+#[must_use]
+pub fn interval(low: f64, high: f64) -> String {
     if !(low.is_finite() && high.is_finite()) {
         return NOTHING.into();
     }
@@ -39,7 +42,8 @@ pub(crate) fn interval(low: f64, high: f64) -> String {
 }
 
 /// A value with the decimals of its interval.
-pub(crate) fn with_interval(value: f64, low: f64, high: f64) -> (String, String) {
+#[must_use]
+pub fn with_interval(value: f64, low: f64, high: f64) -> (String, String) {
     if !(low.is_finite() && high.is_finite()) {
         return (significant(value, 3), NOTHING.into());
     }
@@ -47,7 +51,8 @@ pub(crate) fn with_interval(value: f64, low: f64, high: f64) -> (String, String)
 }
 
 /// A share as percent.
-pub(crate) fn percent(share: f64) -> String {
+#[must_use]
+pub fn percent(share: f64) -> String {
     if share.is_finite() { format!("{} %", fixed(100.0 * share, 0)) } else { NOTHING.into() }
 }
 

@@ -1,0 +1,270 @@
+//! `gripsight identify`: a bag in, tires out.
+
+mod previous;
+mod progress;
+mod summary;
+mod truth;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Context, bail};
+use clap::{Args, ValueEnum};
+use gripsight_bag::{ReadReport, TopicMap, read_sequences};
+use gripsight_identification::export::{Provenance, TireFiles};
+use gripsight_identification::{
+    self as identification, Config, FrictionPrior, Method, ResidualKind, identify,
+};
+use gripsight_report::{Header, IdentificationInput, identification_page};
+use gripsight_signals::{StateSequence, WindowConfig};
+use gripsight_vehicle::VehicleParameters;
+
+use crate::Outcome;
+use crate::camera::{NetworkArgs, prior_of_bag};
+use crate::invocation::invocation;
+use progress::{Progress, Timing};
+
+/// Identify the tires of the car in a bag.
+///
+/// DIR receives identification.json, report.html, timing.json and the files that other stacks read: pacejka.yaml (MPC),
+/// <car>_pacejka.txt and <car>_lookup_table.csv (steering-lookup controllers). Where the result is not accepted, those three
+/// are named *.rejected.* instead, what lies there already stays as it is, and the exit code is 3.
+///
+/// A bag of odometry and drive commands is taken as one stretch. A bag of recorded state sequences is worked through in
+/// their order, as the nodes do live, each starting from the set accepted last; the files describe the last one.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gripsight identify laps.mcap --vehicle car.yaml --out result
+  gripsight identify laps.mcap --vehicle car.yaml --prior-mu 1.0 --out result
+  gripsight identify laps.mcap --vehicle car.yaml --camera --method paper --seed 3 --out result")]
+pub(crate) struct IdentifyArgs {
+    /// An .mcap file or a rosbag2 folder.
+    bag: PathBuf,
+    /// The car, as a ROS 2 parameter file; without it, an F1TENTH-class 1:10 car.
+    #[arg(long, value_name = "FILE")]
+    vehicle: Option<PathBuf>,
+    /// What is believed of the peak friction: where D starts, and where it stays if the peak is not reached.
+    #[arg(long, value_name = "MU", conflicts_with = "camera", value_parser = positive)]
+    prior_mu: Option<f64>,
+    /// Standard deviation of that belief.
+    #[arg(long, value_name = "SIGMA", default_value_t = 0.2, requires = "prior_mu", value_parser = positive)]
+    prior_sigma: f64,
+    /// Take that belief from the bag's camera pictures.
+    #[arg(long)]
+    camera: bool,
+    /// How tires are found: as the paper does, or the most robust way known.
+    #[arg(long, value_enum, default_value_t = MethodName::Robust)]
+    method: MethodName,
+    /// Which network learns what the model leaves over.
+    #[arg(long, value_enum, default_value_t = ResidualName::S4)]
+    residual: ResidualName,
+    /// Seed of everything random.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// A file that maps names to topics, such as `odom: /car_state/odom`; without it topics are found by type.
+    #[arg(long, value_name = "FILE")]
+    topics: Option<PathBuf>,
+    /// An accepted identification.json of the same car: where this run starts, and what it has to beat.
+    #[arg(long, value_name = "FILE")]
+    previous: Option<PathBuf>,
+    /// Only the recorded state sequence with this id.
+    #[arg(long, value_name = "ID")]
+    sequence: Option<u64>,
+    /// True lateral forces by stamp (stamp_s, f_y_front_n, f_y_rear_n, ... as `gripsight simulate` writes), for the report only.
+    #[arg(long, value_name = "FILE")]
+    truth: Option<PathBuf>,
+    /// Name of the surface, for the MPC's file.
+    #[arg(long, value_name = "NAME", default_value = "unknown")]
+    floor: String,
+    /// Where the files go; made if it is not there.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    #[command(flatten)]
+    network: NetworkArgs,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum MethodName {
+    Paper,
+    Robust,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ResidualName {
+    S4,
+    Mlp,
+    Rnn,
+    None,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        Ok(_) => Err("must be positive and finite".into()),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+impl IdentifyArgs {
+    fn config(&self) -> Config {
+        Config {
+            method: match self.method {
+                MethodName::Paper => Method::Paper,
+                MethodName::Robust => Method::Robust,
+            },
+            residual: match self.residual {
+                ResidualName::S4 => ResidualKind::S4,
+                ResidualName::Mlp => ResidualKind::Mlp,
+                ResidualName::Rnn => ResidualKind::Rnn,
+                ResidualName::None => ResidualKind::None,
+            },
+            seed: self.seed,
+            ..Config::default()
+        }
+    }
+
+    fn vehicle(&self) -> anyhow::Result<VehicleParameters> {
+        let Some(path) = &self.vehicle else {
+            tracing::warn!("no --vehicle: taking the values of an F1TENTH-class 1:10 car");
+            return Ok(VehicleParameters::f1tenth());
+        };
+        let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        VehicleParameters::from_ros_yaml(&text).with_context(|| format!("cannot use {}", path.display()))
+    }
+
+    fn prior(&self, topics: &TopicMap) -> anyhow::Result<Option<FrictionPrior>> {
+        if self.camera {
+            return prior_of_bag(&self.bag, topics, &self.network).map(Some);
+        }
+        Ok(self.prior_mu.map(|mu| FrictionPrior { mu, sigma: self.prior_sigma }))
+    }
+
+    /// What to identify from, in order.
+    fn sequences(&self, topics: &TopicMap) -> anyhow::Result<(Vec<StateSequence>, ReadReport)> {
+        // One window over all there is: identification gets better with every corner.
+        let whole = WindowConfig { length_s: f64::INFINITY, hop_s: f64::INFINITY };
+        let (mut sequences, report) = read_sequences(&self.bag, topics, whole)?;
+        if let Some(id) = self.sequence {
+            let ids: Vec<String> = sequences.iter().map(|s| s.sequence_id.to_string()).collect();
+            sequences.retain(|s| s.sequence_id == id);
+            if sequences.is_empty() {
+                bail!("no state sequence {id} in {} (there are: {})", self.bag.display(), ids.join(", "));
+            }
+        }
+        Ok((sequences, report))
+    }
+}
+
+pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
+    let mut timing = Timing::default();
+    let start = Instant::now();
+    let topics = args.topics.as_deref().map(TopicMap::read).transpose()?.unwrap_or_default();
+    let vehicle = args.vehicle()?;
+    let mut previous = args.previous.as_deref().map(previous::read).transpose()?;
+    let (sequences, report) = args.sequences(&topics)?;
+    timing.reading_s = start.elapsed().as_secs_f64();
+    let prior = args.prior(&topics)?;
+    timing.camera_s = start.elapsed().as_secs_f64() - timing.reading_s;
+    fs::create_dir_all(&args.out).with_context(|| format!("cannot make {}", args.out.display()))?;
+    let config = args.config();
+    let progress = Progress::new();
+    let mut last = None;
+    for sequence in &sequences {
+        let mut stages = progress.run(&config);
+        let result =
+            identify(sequence, &vehicle, prior, previous.as_ref(), &config, &mut |stage| stages.enter(stage))
+                .with_context(|| format!("cannot identify the tires from {}", args.bag.display()))?;
+        timing.add(&stages.finish());
+        let writing = Instant::now();
+        let files = write(args, &vehicle, &report, sequence, &result)?;
+        timing.writing_s += writing.elapsed().as_secs_f64();
+        previous = result.accepted_set().or(previous);
+        last = Some((result, files));
+    }
+    timing.total_s = start.elapsed().as_secs_f64();
+    let Some((result, files)) = last else { bail!("{}: no state sequence", args.bag.display()) };
+    let timing_file = args.out.join("timing.json");
+    fs::write(&timing_file, serde_json::to_string_pretty(&timing)? + "\n")
+        .with_context(|| format!("cannot write {}", timing_file.display()))?;
+    print!("{}", summary::summary(&car_name(args, &vehicle), &result, &files, &timing));
+    Ok(if result.accepted { Outcome::Done } else { Outcome::NotAccepted })
+}
+
+/// The car's name: the vehicle file's, else the bag's.
+fn car_name(args: &IdentifyArgs, vehicle: &VehicleParameters) -> String {
+    let stem = || args.bag.file_stem().map(|s| s.to_string_lossy().into_owned());
+    vehicle.name.clone().or_else(stem).unwrap_or_else(|| "car".into())
+}
+
+/// Everything but the times, which are not the result's.
+fn write(
+    args: &IdentifyArgs,
+    vehicle: &VehicleParameters,
+    report: &ReadReport,
+    sequence: &StateSequence,
+    result: &identification::Outcome,
+) -> anyhow::Result<Vec<PathBuf>> {
+    let file_name = |path: &Path| path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+    let provenance = Provenance {
+        car: car_name(args, vehicle),
+        bag: file_name(&args.bag),
+        data_stamp_ns: sequence.start_stamp_ns,
+        tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+        vehicle_hash: result.key.vehicle_hash.clone(),
+        seed: args.seed,
+        command: invocation(std::env::args()),
+        notes: result.reasons.clone(),
+    };
+    let header = Header {
+        car: provenance.car.clone(),
+        bag: provenance.bag.clone(),
+        data_stamp: provenance.stamp(),
+        tool_version: provenance.tool_version.clone(),
+        vehicle_hash: provenance.vehicle_hash.clone(),
+        seed: args.seed,
+        command: provenance.command.clone(),
+    };
+    let truth =
+        args.truth.as_deref().map(|path| truth::curves(path, sequence, vehicle, result)).transpose()?;
+    let page = identification_page(&IdentificationInput {
+        outcome: result,
+        header: &header,
+        truth: truth.as_ref(),
+        data_notes: &data_notes(report),
+    })?;
+    let texts =
+        [("identification.json", serde_json::to_string_pretty(result)? + "\n"), ("report.html", page)];
+    let mut files = Vec::new();
+    for (name, text) in texts {
+        let path = args.out.join(name);
+        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
+        files.push(path);
+    }
+    let tire_files = TireFiles {
+        tires: &result.phi_p,
+        vehicle,
+        provenance: &provenance,
+        floor: &args.floor,
+        driven_mps: result.v_x_range_mps.high,
+    };
+    files.extend(tire_files.write(&args.out, result.accepted)?);
+    Ok(files)
+}
+
+/// What reading the bag met, in sentences.
+fn data_notes(report: &ReadReport) -> Vec<String> {
+    let counted = [
+        (
+            report.without_content,
+            "messages say nothing: joints that are not the four wheels, or not measured",
+        ),
+        (report.without_drive, "odometry messages left out: no drive command in force"),
+        (report.duplicates, "messages left out: a stamp seen before"),
+    ];
+    let counted = counted.into_iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}"));
+    let recorded =
+        report.recorded_sequences.iter().map(|topic| format!("state sequences recorded on {topic}"));
+    report.truncated.clone().into_iter().chain(recorded).chain(counted).collect()
+}

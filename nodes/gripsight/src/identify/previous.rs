@@ -1,0 +1,59 @@
+//! An earlier identification.json, as where to start.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use gripsight_identification::{AcceptedSet, PerAxle, RunKey, SignalCorrections};
+use gripsight_vehicle::PacejkaParameters;
+use serde::Deserialize;
+
+/// The part of identification.json that a later run needs.
+#[derive(Deserialize)]
+struct Earlier {
+    accepted: bool,
+    phi_p: PacejkaParameters,
+    signals: SignalCorrections,
+    peak_friction: PerAxle<Peak>,
+    rmse: Errors,
+    key: RunKey,
+}
+
+#[derive(Deserialize)]
+struct Peak {
+    reached: bool,
+}
+
+#[derive(Deserialize)]
+struct Errors {
+    rollout: Rollout,
+}
+
+#[derive(Deserialize)]
+struct Rollout {
+    v_y_mps: Change,
+    yaw_rate_radps: Change,
+}
+
+#[derive(Deserialize)]
+struct Change {
+    after: f64,
+}
+
+/// Reads an accepted set.
+pub(super) fn read(path: &Path) -> anyhow::Result<AcceptedSet> {
+    let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let earlier: Earlier = serde_json::from_str(&text)
+        .with_context(|| format!("{} is not an identification.json", path.display()))?;
+    if !earlier.accepted {
+        bail!("{}: that identification was not accepted", path.display());
+    }
+    Ok(AcceptedSet {
+        vehicle_hash: earlier.key.vehicle_hash,
+        sequence_id: earlier.key.sequence_id,
+        phi_p: earlier.phi_p,
+        corrections: earlier.signals,
+        rollout_rmse: [earlier.rmse.rollout.v_y_mps.after, earlier.rmse.rollout.yaw_rate_radps.after],
+        peak_reached: earlier.peak_friction.map(|p| p.reached),
+    })
+}
