@@ -1,0 +1,291 @@
+//! The library of candidate effects: one small piece of code each, all in the same form.
+//!
+//! # How to add an effect
+//!
+//! 1. Write a type that implements [`Effect`] in the file of its family (or in a new one): its [`EffectSpec`] (name, equation, source,
+//!    parameters with units, null value, bounds and a typical size, what must be recorded and driven to see it) and the hooks that
+//!    it needs. All hooks do nothing by default:
+//!    * [`Effect::steer`]: between the recorded steering and the road wheels;
+//!    * [`Effect::car`]: constants (mass, inertia, axle distances, relaxation length, speed factor);
+//!    * [`Effect::loads`], [`Effect::grip`]: per axle and instant: load, extra steering angle, grip, usable share;
+//!    * [`Effect::motion`]: accelerations from outside the tires;
+//!    * [`Effect::sense`]: from the car's motion to the recorded signals.
+//! 2. Write the equation for any [`Real`]; with the parameters at their null value it must leave everything exactly as it was
+//!    (multiply by 1, add 0), and its derivative there should not vanish, or the screening cannot see it (set `starts` else).
+//! 3. Add the type to the list at the end of this file. The test `null_values_leave_the_nominal_model` takes it up by itself.
+
+mod chassis;
+mod grip;
+mod loads;
+mod longitudinal;
+mod road;
+mod sensors;
+mod steering;
+mod tire;
+
+use gripsight_vehicle::Real;
+
+use crate::terms::{Axles, Car, Moment, Motion, Outputs};
+
+/// What must be recorded for an effect to show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Need {
+    /// A longitudinal command (drive acceleration or wheel torque).
+    LongitudinalCommand,
+    /// An inertial unit's accelerations.
+    Accelerometer,
+    /// A pose with at least one and a half laps.
+    Laps,
+    /// Tires known from elsewhere (a file or a reference drive) and trusted.
+    ReferenceTires,
+}
+
+impl Need {
+    /// In words, as a reason why an effect is invisible.
+    #[must_use]
+    pub fn reason(self) -> &'static str {
+        match self {
+            Self::LongitudinalCommand => "no longitudinal command is recorded",
+            Self::Accelerometer => "no accelerometer is recorded",
+            Self::Laps => "no pose over at least one and a half laps is recorded",
+            Self::ReferenceTires => "with the tires free it is the same as other tires: give --pacejka or a reference bag",
+        }
+    }
+}
+
+/// A parameter of an effect as the fit sees it.
+#[derive(Debug, Clone, Copy)]
+pub struct ParameterSpec {
+    /// Name with unit, as reported.
+    pub name: &'static str,
+    /// Unit in the report; `1` for none.
+    pub unit: &'static str,
+    /// The value at which the effect is absent.
+    pub null: f64,
+    /// A size that matters on a 1:10 car and on a full-size car.
+    pub size: [f64; 2],
+    /// Bounds as multiples of the size around the null value.
+    pub range: [f64; 2],
+}
+
+/// A number that the report states for an effect, computed from its fitted parameters.
+#[derive(Debug, Clone, Copy)]
+pub struct Reported {
+    /// Name with unit.
+    pub name: &'static str,
+    /// Unit; `1` for none.
+    pub unit: &'static str,
+    /// From the fitted parameters.
+    pub value: fn(&[f64]) -> f64,
+}
+
+/// Everything about an effect but its equation in code.
+#[derive(Debug, Clone, Copy)]
+pub struct EffectSpec {
+    /// Canonical name.
+    pub name: &'static str,
+    /// The equation in one line.
+    pub equation: &'static str,
+    /// Where it comes from.
+    pub source: &'static str,
+    /// What must be driven to see it.
+    pub excitation: &'static str,
+    /// What must be recorded to see it.
+    pub needs: &'static [Need],
+    /// What the fit moves.
+    pub parameters: &'static [ParameterSpec],
+    /// What the report states, where it is not the fit's parameters themselves.
+    pub reported: &'static [Reported],
+    /// Starts of the refit, in multiples of the size; one number applies to all parameters.
+    pub starts: &'static [f64],
+    /// Whether its derivative vanishes at the null value, so that screening must look at its first start instead.
+    pub flat_at_null: bool,
+}
+
+/// An effect. See the module's text.
+pub trait Effect {
+    /// Names, units, bounds, source.
+    const SPEC: EffectSpec;
+
+    /// Between the recorded steering and the road wheels: changes the series, `dt_s` apart.
+    fn steer<T: Real>(_p: &[T], _steering_rad: &mut [T], _dt_s: f64) {}
+
+    /// Changes constants of the car.
+    fn car<T: Real>(_p: &[T], _car: &mut Car<T>) {}
+
+    /// Changes loads and extra steering angles of the axles at an instant.
+    fn loads<T: Real>(_p: &[T], _car: &Car<T>, _at: &Moment<T>, _axles: &mut Axles<T>) {}
+
+    /// Changes grip and usable share of the axles at an instant; the loads are known.
+    fn grip<T: Real>(_p: &[T], _car: &Car<T>, _at: &Moment<T>, _axles: &mut Axles<T>) {}
+
+    /// Adds accelerations from outside the tires.
+    fn motion<T: Real>(_p: &[T], _car: &Car<T>, _at: &Moment<T>, _motion: &mut Motion<T>) {}
+
+    /// From the car's motion to the recorded signals.
+    fn sense<T: Real>(_p: &[T], _out: &mut Outputs<T>) {}
+}
+
+/// Declares the list of effects, and sends each hook to the effect's own code.
+macro_rules! library {
+    ($($variant:ident = $effect:path),+ $(,)?) => {
+        /// A candidate effect.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub enum EffectId {
+            $(
+                #[doc = concat!("`", stringify!($effect), "`")]
+                $variant,
+            )+
+        }
+
+        impl EffectId {
+            /// All of the library, in its order.
+            pub const ALL: &[Self] = &[$(Self::$variant),+];
+
+            /// Names, units, bounds, source.
+            #[must_use]
+            pub const fn spec(self) -> &'static EffectSpec {
+                match self {
+                    $(Self::$variant => &<$effect as Effect>::SPEC,)+
+                }
+            }
+
+            pub(crate) fn steer<T: Real>(self, p: &[T], steering_rad: &mut [T], dt_s: f64) {
+                match self {
+                    $(Self::$variant => <$effect>::steer(p, steering_rad, dt_s),)+
+                }
+            }
+
+            pub(crate) fn car<T: Real>(self, p: &[T], car: &mut Car<T>) {
+                match self {
+                    $(Self::$variant => <$effect>::car(p, car),)+
+                }
+            }
+
+            pub(crate) fn loads<T: Real>(self, p: &[T], car: &Car<T>, at: &Moment<T>, axles: &mut Axles<T>) {
+                match self {
+                    $(Self::$variant => <$effect>::loads(p, car, at, axles),)+
+                }
+            }
+
+            pub(crate) fn grip<T: Real>(self, p: &[T], car: &Car<T>, at: &Moment<T>, axles: &mut Axles<T>) {
+                match self {
+                    $(Self::$variant => <$effect>::grip(p, car, at, axles),)+
+                }
+            }
+
+            pub(crate) fn motion<T: Real>(self, p: &[T], car: &Car<T>, at: &Moment<T>, motion: &mut Motion<T>) {
+                match self {
+                    $(Self::$variant => <$effect>::motion(p, car, at, motion),)+
+                }
+            }
+
+            pub(crate) fn sense<T: Real>(self, p: &[T], out: &mut Outputs<T>) {
+                match self {
+                    $(Self::$variant => <$effect>::sense(p, out),)+
+                }
+            }
+        }
+    };
+}
+
+library! {
+    TireRelaxation = tire::TireRelaxation,
+    LateralLoadTransfer = grip::LateralLoadTransfer,
+    LongitudinalLoadTransfer = loads::LongitudinalLoadTransfer,
+    CombinedSlip = tire::CombinedSlip,
+    GripScale = grip::GripScale,
+    GripBalance = grip::GripBalance,
+    LowGripPatch = grip::LowGripPatch,
+    TireWear = grip::TireWear,
+    SteeringLag = steering::SteeringLag,
+    SteeringDelay = steering::SteeringDelay,
+    SteeringGain = steering::SteeringGain,
+    SteeringOffset = steering::SteeringOffset,
+    SteeringBacklash = steering::SteeringBacklash,
+    SteeringRateLimit = steering::SteeringRateLimit,
+    AeroDownforce = loads::AeroDownforce,
+    AeroDrag = longitudinal::AeroDrag,
+    RollingResistance = longitudinal::RollingResistance,
+    MassError = chassis::MassError,
+    YawInertiaError = chassis::YawInertiaError,
+    CogShift = chassis::CogShift,
+    RoadBank = road::RoadBank,
+    RoadSlope = road::RoadSlope,
+    ComplianceSteer = chassis::ComplianceSteer,
+    RollSteer = chassis::RollSteer,
+    DifferentialYawMoment = chassis::DifferentialYawMoment,
+    VyLeverArm = sensors::VyLeverArm,
+    VyBias = sensors::VyBias,
+    OdometryDelay = sensors::OdometryDelay,
+    OdometryLowPass = sensors::OdometryLowPass,
+    VxScale = sensors::VxScale,
+    ImuLeverArm = sensors::ImuLeverArm,
+    ImuTilt = sensors::ImuTilt,
+    GyroScale = sensors::GyroScale,
+    GyroBias = sensors::GyroBias,
+}
+
+impl EffectId {
+    /// The effect of a canonical name.
+    #[must_use]
+    pub fn by_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|e| e.spec().name == name)
+    }
+
+    /// Canonical name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        self.spec().name
+    }
+}
+
+/// A parameter with its null at 0 and bounds on both sides.
+const fn both_sides(name: &'static str, unit: &'static str, size: [f64; 2]) -> ParameterSpec {
+    ParameterSpec { name, unit, null: 0.0, size, range: [-5.0, 5.0] }
+}
+
+/// A parameter that cannot be negative, null at 0.
+const fn positive(name: &'static str, unit: &'static str, size: [f64; 2]) -> ParameterSpec {
+    ParameterSpec { name, unit, null: 0.0, size, range: [0.0, 5.0] }
+}
+
+/// A spec with the usual choices; the rest is filled in by the effect.
+const fn spec(
+    name: &'static str,
+    equation: &'static str,
+    source: &'static str,
+    excitation: &'static str,
+    parameters: &'static [ParameterSpec],
+) -> EffectSpec {
+    EffectSpec {
+        name,
+        equation,
+        source,
+        excitation,
+        needs: &[],
+        parameters,
+        reported: &[],
+        starts: &[0.0],
+        flat_at_null: false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique_and_found() {
+        for &effect in EffectId::ALL {
+            assert_eq!(EffectId::by_name(effect.name()), Some(effect));
+            let spec = effect.spec();
+            assert!(!spec.parameters.is_empty() && !spec.equation.is_empty() && !spec.source.is_empty());
+            for p in spec.parameters {
+                assert!(p.size.iter().all(|s| *s > 0.0) && p.range[0] <= 0.0 && p.range[1] > 0.0, "{}", p.name);
+            }
+        }
+        assert_eq!(EffectId::by_name("magic"), None);
+        assert_eq!(EffectId::ALL.len(), 34);
+    }
+}

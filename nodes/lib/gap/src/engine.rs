@@ -1,0 +1,288 @@
+//! One engine for everything that is fitted or scored: the extended model on windows with free starts.
+
+use gripsight_identification::shooting::{
+    self, Fit, Linearization, Parameter, Prior, Problem, StopReason, Window,
+};
+use gripsight_vehicle::{PacejkaParameters, VehicleParameters, handling};
+
+use crate::effects::{EffectId, ParameterSpec};
+use crate::flexible::Flexible;
+use crate::model::{BASE, ExtendedModel, HOLD, TIRES, tires_from_parameters, tires_to_parameters};
+use crate::recording::Recording;
+use crate::windows::Windows;
+
+/// How far the tires handed over are trusted, as one standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TireTrust {
+    /// Of the cornering stiffness, relative.
+    pub stiffness: f64,
+    /// Of the peak D, relative.
+    pub peak: f64,
+    /// Of C, absolute.
+    pub shape: f64,
+    /// Of E, absolute.
+    pub curvature: f64,
+}
+
+impl TireTrust {
+    /// Tires from a file or a reference drive: a few percent.
+    #[must_use]
+    pub fn reference() -> Self {
+        Self { stiffness: 0.05, peak: 0.05, shape: 0.1, curvature: 0.5 }
+    }
+
+    /// No tires given: only what makes the fit well posed.
+    #[must_use]
+    pub fn free() -> Self {
+        Self { stiffness: 1.0, peak: 0.4, shape: 0.15, curvature: 0.6 }
+    }
+}
+
+/// Bounds of (B C D, C, D, E).
+const TIRE_BOUNDS: [[f64; 2]; 4] = [[1.5, 80.0], [1.0, 2.3], [0.1, 3.0], [-4.0, 0.98]];
+/// Effects are expected within this many of their sizes.
+const PRIOR_SIZES: f64 = 3.0;
+/// Windows whose mean square is beyond this many sigma count less and less.
+pub(crate) const ROBUST_K: f64 = 3.0;
+
+/// A model with its parameters fitted.
+#[derive(Debug, Clone)]
+pub(crate) struct State {
+    pub(crate) effects: Vec<EffectId>,
+    pub(crate) parameters: Vec<f64>,
+    pub(crate) starts: Vec<[f64; 2]>,
+    pub(crate) cost: f64,
+    pub(crate) window_costs: Vec<f64>,
+    pub(crate) on_bound: Vec<usize>,
+    pub(crate) finite: bool,
+    pub(crate) fit: Option<Box<Fit>>,
+}
+
+impl State {
+    /// Parameters of one of its effects.
+    pub(crate) fn of(&self, effect: EffectId) -> Option<&[f64]> {
+        let mut from = BASE;
+        for &e in &self.effects {
+            let n = e.spec().parameters.len();
+            if e == effect {
+                return Some(&self.parameters[from..from + n]);
+            }
+            from += n;
+        }
+        None
+    }
+
+    pub(crate) fn tires(&self) -> PacejkaParameters {
+        tires_from_parameters(&self.parameters[..TIRES])
+    }
+}
+
+/// What all fits share.
+#[derive(Debug, Clone)]
+pub(crate) struct Engine<'a> {
+    pub(crate) recording: &'a Recording,
+    pub(crate) vehicle: &'a VehicleParameters,
+    pub(crate) nominal: PacejkaParameters,
+    pub(crate) trust: TireTrust,
+    /// Weights of the channels: what residuals are divided by when fitting.
+    pub(crate) sigma: Vec<f64>,
+    /// 0 for a 1:10 car, 1 for a full-size one: where between the two sizes of an effect this car lies.
+    size_place: f64,
+    pub(crate) substep_s: f64,
+}
+
+/// How long a substep may be: a share of the fastest time constant of the car.
+fn substep_s(vehicle: &VehicleParameters, tires: &PacejkaParameters, v_x_mps: f64) -> f64 {
+    const LONGEST_S: f64 = 0.005;
+    const SHORTEST_S: f64 = 0.002;
+    const SHARE: f64 = 0.12;
+    let (k_f, k_r) = handling::cornering_stiffness_n_per_rad(vehicle, tires);
+    let (l_f, l_r) = (vehicle.l_f_m, vehicle.l_r_m);
+    let lateral = (k_f + k_r) / (vehicle.mass_kg * v_x_mps);
+    let yaw = (k_f * l_f * l_f + k_r * l_r * l_r) / (vehicle.yaw_inertia_kgm2 * v_x_mps);
+    (SHARE / lateral.max(yaw)).clamp(SHORTEST_S, LONGEST_S)
+}
+
+impl<'a> Engine<'a> {
+    pub(crate) fn new(
+        recording: &'a Recording,
+        vehicle: &'a VehicleParameters,
+        nominal: PacejkaParameters,
+        trust: TireTrust,
+    ) -> Self {
+        let v_x_mps = recording.typical_speed_mps().max(0.5);
+        Self {
+            recording,
+            vehicle,
+            nominal,
+            trust,
+            sigma: recording.weights.clone(),
+            size_place: ((vehicle.wheelbase_m() / 0.32).ln() / (3.0_f64 / 0.32).ln()).clamp(0.0, 1.0),
+            substep_s: substep_s(vehicle, &nominal, v_x_mps),
+        }
+    }
+
+    /// A size of the parameter that matters on this car.
+    pub(crate) fn size(&self, spec: &ParameterSpec) -> f64 {
+        spec.size[0] * (spec.size[1] / spec.size[0]).powf(self.size_place)
+    }
+
+    /// The nominal model on the tires handed over.
+    pub(crate) fn nominal_parameters(&self) -> Vec<f64> {
+        let mut p = tires_to_parameters(&self.nominal).to_vec();
+        p.push(0.5 * self.recording.dt_s());
+        p
+    }
+
+    pub(crate) fn model(&self, effects: &[EffectId], flexible: Option<&Flexible>) -> ExtendedModel<'a> {
+        let mut model = ExtendedModel::new(self.recording, self.vehicle, effects, self.substep_s);
+        model.flexible = flexible.cloned();
+        model
+    }
+
+    /// Values at the null of every effect.
+    pub(crate) fn null_values(effect: EffectId) -> Vec<f64> {
+        effect.spec().parameters.iter().map(|p| p.null).collect()
+    }
+
+    /// Bounds and priors of all parameters of a model; `values` is where a fit starts.
+    pub(crate) fn parameters(&self, effects: &[EffectId], values: &[f64], ridge: f64) -> Vec<Parameter> {
+        let mean = tires_to_parameters(&self.nominal);
+        let trust = &self.trust;
+        let mut out: Vec<Parameter> = (0..TIRES)
+            .map(|j| {
+                let [low, high] = TIRE_BOUNDS[j % 4];
+                let sigma = match j % 4 {
+                    0 => trust.stiffness * mean[j],
+                    1 => trust.shape,
+                    2 => trust.peak * mean[j],
+                    _ => trust.curvature,
+                };
+                Parameter { start: values[j], low, high, free: true, prior: Some(Prior { mean: mean[j], sigma }) }
+            })
+            .collect();
+        let dt_s = self.recording.dt_s();
+        // A command that is late is a command, and held until the next; a measured angle is neither.
+        let commanded = effects.iter().any(|e| matches!(e, EffectId::SteeringDelay | EffectId::SteeringLag));
+        out.push(Parameter {
+            start: if commanded { 0.5 * dt_s } else { values[HOLD] },
+            low: 0.0,
+            high: 0.5 * dt_s,
+            free: !commanded,
+            prior: None,
+        });
+        for effect in effects {
+            for spec in effect.spec().parameters {
+                let size = self.size(spec);
+                let place = out.len();
+                out.push(Parameter {
+                    start: values[place],
+                    low: spec.null + spec.range[0] * size,
+                    high: spec.null + spec.range[1] * size,
+                    free: true,
+                    prior: Some(Prior { mean: spec.null, sigma: PRIOR_SIZES * size }),
+                });
+            }
+        }
+        for &start in &values[out.len()..] {
+            let prior = Some(Prior { mean: 0.0, sigma: ridge });
+            out.push(Parameter { start, low: -1e3, high: 1e3, free: true, prior });
+        }
+        out
+    }
+
+    fn problem<'p>(
+        &'p self,
+        model: &'p ExtendedModel<'a>,
+        windows: &'p [Window],
+        parameters: &'p [Parameter],
+        max_iterations: usize,
+    ) -> Problem<'p, ExtendedModel<'a>> {
+        Problem { model, windows, sigma: &self.sigma, parameters, robust_k: ROBUST_K, max_iterations }
+    }
+
+    /// Fits the tires and the effects together.
+    pub(crate) fn fit(
+        &self,
+        effects: &[EffectId],
+        values: &[f64],
+        starts: Option<Vec<[f64; 2]>>,
+        windows: &Windows,
+        max_iterations: usize,
+    ) -> State {
+        let model = self.model(effects, None);
+        let parameters = self.parameters(effects, values, 1.0);
+        let fit = shooting::fit(&self.problem(&model, &windows.windows, &parameters, max_iterations), starts);
+        State {
+            effects: effects.to_vec(),
+            parameters: fit.parameters.clone(),
+            starts: fit.starts.clone(),
+            cost: fit.linearization.cost,
+            window_costs: fit.linearization.window_costs.clone(),
+            on_bound: fit.on_bound.clone(),
+            finite: fit.stop != StopReason::NotFinite,
+            fit: Some(Box::new(fit)),
+        }
+    }
+
+    /// Fits flexible terms on top of a state, whose own parameters stay: an upper bound of what an additive term explains.
+    pub(crate) fn fit_flexible(&self, state: &State, flexible: &Flexible, windows: &Windows) -> Vec<f64> {
+        const RIDGE: f64 = 1.0;
+        const STEPS: usize = 3;
+        let model = self.model(&state.effects, Some(flexible));
+        let mut values = state.parameters.clone();
+        values.extend(std::iter::repeat_n(0.0, flexible.parameters()));
+        let mut parameters = self.parameters(&state.effects, &values, RIDGE);
+        let own = state.parameters.len();
+        parameters[..own].iter_mut().for_each(|p| p.free = false);
+        let problem = self.problem(&model, &windows.windows, &parameters, STEPS);
+        shooting::fit(&problem, Some(state.starts.clone())).parameters
+    }
+
+    /// One Jacobian of all parameters of a model.
+    pub(crate) fn linearize(
+        &self,
+        effects: &[EffectId],
+        values: &[f64],
+        starts: &[[f64; 2]],
+        windows: &Windows,
+    ) -> Linearization {
+        let model = self.model(effects, None);
+        let parameters = self.parameters(effects, values, 1.0);
+        shooting::linearize(&self.problem(&model, &windows.windows, &parameters, 0), values, starts)
+    }
+
+    /// Best starts for fixed parameters, and the plain sum of squares of each window in units of the noise.
+    pub(crate) fn score(
+        &self,
+        effects: &[EffectId],
+        flexible: Option<&Flexible>,
+        values: &[f64],
+        windows: &Windows,
+    ) -> Score {
+        let model = self.model(effects, flexible);
+        let parameters: Vec<Parameter> = values
+            .iter()
+            .map(|&start| Parameter { start, low: f64::NEG_INFINITY, high: f64::INFINITY, free: false, prior: None })
+            .collect();
+        let problem = Problem {
+            model: &model,
+            windows: &windows.windows,
+            sigma: &self.recording.sigma,
+            parameters: &parameters,
+            robust_k: f64::INFINITY,
+            max_iterations: 6,
+        };
+        let fit = shooting::fit(&problem, None);
+        Score { squares: fit.linearization.window_costs, starts: fit.starts }
+    }
+}
+
+/// Errors of a model on windows.
+#[derive(Debug, Clone)]
+pub(crate) struct Score {
+    /// Sum of squares of each window over the noise variance.
+    pub(crate) squares: Vec<f64>,
+    /// The start states that go with them.
+    pub(crate) starts: Vec<[f64; 2]>,
+}

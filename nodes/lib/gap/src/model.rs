@@ -1,0 +1,191 @@
+//! The single-track model with effects: what is fitted, and how it is run over a window.
+//!
+//! With no effect, or with all at their null values, it is exactly `vehicle::SingleTrack`. Parameters, in order: the tires (cornering stiffness
+//! over load B C D, C, D, E; front, then rear), the hold of the steering command, then those of the effects, then those of the
+//! flexible terms.
+
+use gripsight_identification::shooting::{Rollout, Window};
+use gripsight_vehicle::{MagicFormula, PacejkaParameters, Real, VehicleParameters};
+
+use crate::effects::EffectId;
+use crate::flexible::Flexible;
+use crate::motion::Mover;
+use crate::recording::{Channel, Recording};
+use crate::terms::{Car, Outputs, delayed};
+
+/// Parameters of the tires.
+pub(crate) const TIRES: usize = 8;
+/// Place of the hold of the command: how long after its stamp a recorded steering angle acts, within one sample.
+pub(crate) const HOLD: usize = TIRES;
+/// Parameters before those of the effects.
+pub(crate) const BASE: usize = TIRES + 1;
+
+/// Time before a window from which the steering is followed.
+const RUN_IN_S: f64 = 1.0;
+
+/// The model with a list of effects, on a recording.
+#[derive(Debug, Clone)]
+pub(crate) struct ExtendedModel<'a> {
+    pub(crate) recording: &'a Recording,
+    pub(crate) vehicle: &'a VehicleParameters,
+    pub(crate) effects: Vec<EffectId>,
+    pub(crate) flexible: Option<Flexible>,
+    pub(crate) substep_s: f64,
+}
+
+/// Tires as the fit sees them: B C D, C, D, E of front and rear.
+pub(crate) fn tires_to_parameters(tires: &PacejkaParameters) -> [f64; TIRES] {
+    let axle = |t: &MagicFormula| [t.normalized_stiffness(), t.c, t.d, t.e];
+    let (f, r) = (axle(&tires.front), axle(&tires.rear));
+    [f[0], f[1], f[2], f[3], r[0], r[1], r[2], r[3]]
+}
+
+/// The inverse of [`tires_to_parameters`].
+pub(crate) fn tires_from_parameters<T: Real>(p: &[T]) -> PacejkaParameters<T> {
+    let axle = |p: &[T]| MagicFormula { b: p[0] / (p[1] * p[2]), c: p[1], d: p[2], e: p[3] };
+    PacejkaParameters { front: axle(&p[..4]), rear: axle(&p[4..]) }
+}
+
+impl<'a> ExtendedModel<'a> {
+    pub(crate) fn new(
+        recording: &'a Recording,
+        vehicle: &'a VehicleParameters,
+        effects: &[EffectId],
+        substep_s: f64,
+    ) -> Self {
+        Self { recording, vehicle, effects: effects.to_vec(), flexible: None, substep_s }
+    }
+
+    /// Where the parameters of the effect at a place of the list start, and how many there are.
+    pub(crate) fn place(&self, index: usize) -> (usize, usize) {
+        let from = BASE + self.effects[..index].iter().map(|e| e.spec().parameters.len()).sum::<usize>();
+        (from, self.effects[index].spec().parameters.len())
+    }
+
+    /// Each effect with its parameters.
+    pub(crate) fn with_parameters<'p, T>(&'p self, p: &'p [T]) -> impl Iterator<Item = (EffectId, &'p [T])> {
+        let mut from = BASE;
+        self.effects.iter().map(move |&e| {
+            let n = e.spec().parameters.len();
+            from += n;
+            (e, &p[from - n..from])
+        })
+    }
+
+    /// Parameters of the flexible terms.
+    pub(crate) fn flexible_parameters<'p, T>(&self, p: &'p [T]) -> &'p [T] {
+        &p[BASE + self.effects.iter().map(|e| e.spec().parameters.len()).sum::<usize>()..]
+    }
+
+    fn road_wheel_angles<T: Real>(&self, p: &[T], window: &Window) -> Vec<T> {
+        let run = &self.recording.runs[window.segment];
+        let run_in = ((RUN_IN_S / run.dt_s).ceil() as usize).min(window.from);
+        // One sample more than the window: delays interpolate with both neighbours.
+        let to = (window.from + window.len + 1).min(run.len());
+        let series: Vec<T> =
+            run.steering_rad[window.from - run_in..to].iter().map(|&u| T::from(u)).collect();
+        let mut series = delayed(&series, p[HOLD], run.dt_s);
+        for (effect, values) in self.with_parameters(p) {
+            effect.steer(values, &mut series, run.dt_s);
+        }
+        series.split_off(run_in)
+    }
+
+    fn flatten<T: Real>(&self, outputs: &Outputs<T>, out: &mut Vec<T>) {
+        let n = outputs.v_y_mps.len();
+        let series: Vec<(&[T], T)> = self
+            .recording
+            .channels
+            .iter()
+            .map(|c| {
+                let values: &[T] = match c {
+                    Channel::LateralVelocity => &outputs.v_y_mps,
+                    Channel::YawRate | Channel::Gyro => &outputs.yaw_rate_radps,
+                    Channel::LateralAcceleration => &outputs.a_y_mps2,
+                    Channel::Heading => &outputs.heading_rad,
+                    Channel::LongitudinalAcceleration => &outputs.a_x_mps2,
+                    Channel::Speed => &outputs.v_x_mps,
+                };
+                let mean = if c.without_mean() {
+                    values.iter().fold(T::from(0.0), |s, v| s + *v) / n as f64
+                } else {
+                    T::from(0.0)
+                };
+                (values, mean)
+            })
+            .collect();
+        out.clear();
+        for k in 0..n {
+            out.extend(series.iter().map(|(values, mean)| values[k] - *mean));
+        }
+    }
+
+    /// The motion over a window, as recorded by its sensors.
+    pub(crate) fn predict<T: Real>(&self, p: &[T], start: [T; 2], window: &Window) -> Outputs<T> {
+        let tires = tires_from_parameters(&p[..TIRES]);
+        let mut car = Car::nominal(self.vehicle, [tires.front.d, tires.rear.d]);
+        for (effect, values) in self.with_parameters(p) {
+            effect.car(values, &mut car);
+        }
+        let steering = self.road_wheel_angles(p, window);
+        let mover = Mover { model: self, p, car, tires, steering: &steering, window };
+        let mut outputs = mover.run(start);
+        let shift = car.cog_shift_m;
+        for k in 0..outputs.v_y_mps.len() {
+            let (r, acceleration) = (outputs.yaw_rate_radps[k], outputs.yaw_acceleration_radps2[k]);
+            outputs.v_y_mps[k] -= shift * r;
+            outputs.a_y_mps2[k] -= shift * acceleration;
+            outputs.a_x_mps2[k] += shift * r * r;
+        }
+        for (effect, values) in self.with_parameters(p) {
+            effect.sense(values, &mut outputs);
+        }
+        if let Some(flexible) = &self.flexible {
+            flexible.sense(self.flexible_parameters(p), &self.recording.channels, &mut outputs);
+        }
+        outputs
+    }
+}
+
+impl Rollout for ExtendedModel<'_> {
+    fn channels(&self) -> usize {
+        self.recording.channels.len()
+    }
+
+    fn rollout<T: Real>(&self, parameters: &[T], start: [T; 2], window: &Window, out: &mut Vec<T>) {
+        let outputs = self.predict(parameters, start, window);
+        self.flatten(&outputs, out);
+    }
+
+    fn measured(&self, window: &Window, out: &mut Vec<f64>) {
+        out.clear();
+        let run = &self.recording.runs[window.segment];
+        let range = window.from..window.from + window.len;
+        let channels = &self.recording.channels;
+        let means: Vec<f64> = channels
+            .iter()
+            .zip(&run.measured)
+            .map(|(c, v)| {
+                if c.without_mean() { v[range.clone()].iter().sum::<f64>() / window.len as f64 } else { 0.0 }
+            })
+            .collect();
+        for k in range {
+            out.extend(run.measured.iter().zip(&means).map(|(v, m)| v[k] - m));
+        }
+    }
+
+    fn start_guess(&self, window: &Window) -> [f64; 2] {
+        let run = &self.recording.runs[window.segment];
+        // The first few samples, as a line to the start: less noise than the first alone.
+        let count = 7.min(window.len);
+        let line = |c: usize| {
+            let y = &run.measured[c][window.from..window.from + count];
+            let middle = (count - 1) as f64 / 2.0;
+            let mean = y.iter().sum::<f64>() / count as f64;
+            let square: f64 = (0..count).map(|i| (i as f64 - middle).powi(2)).sum();
+            let slope: f64 = y.iter().enumerate().map(|(i, v)| (i as f64 - middle) * v).sum::<f64>();
+            mean - middle * slope / square.max(1e-9)
+        };
+        [line(0), line(1)]
+    }
+}

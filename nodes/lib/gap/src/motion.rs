@@ -1,0 +1,252 @@
+//! The equations of motion with the effects in their places, integrated over a window.
+//!
+//! Explicit midpoint rule, like the nominal model; lags inside the loop (relaxation, roll) are solved exactly for an input that is linear
+//! over the step, so that a lag of zero is no lag at all and its derivative there is right.
+
+use gripsight_identification::shooting::Window;
+use gripsight_vehicle::{PacejkaParameters, Real};
+
+use crate::effects::EffectId;
+use crate::model::ExtendedModel;
+use crate::terms::{Axle, Car, Moment, Motion, Outputs, lagged};
+
+/// Below this forward speed slip angles mean nothing; the model is evaluated as if at this speed.
+const MIN_SPEED_MPS: f64 = 0.2;
+/// Time in which the body follows the lateral acceleration in roll.
+const ROLL_TIME_S: f64 = 0.08;
+
+/// Runs the car over one window.
+pub(crate) struct Mover<'m, 'a, T> {
+    pub(crate) model: &'m ExtendedModel<'a>,
+    pub(crate) p: &'m [T],
+    pub(crate) car: Car<T>,
+    pub(crate) tires: PacejkaParameters<T>,
+    pub(crate) steering: &'m [T],
+    pub(crate) window: &'m Window,
+}
+
+/// The inputs of an instant.
+struct Instant<T> {
+    v_x_mps: T,
+    steering_rad: T,
+    a_x_mps2: f64,
+    force_x_mps2: f64,
+    minutes: f64,
+    lap_share: f64,
+}
+
+/// What an instant leaves behind for the next.
+#[derive(Clone, Copy)]
+struct Memory<T> {
+    a_y_mps2: T,
+    rolled_a_y_mps2: T,
+    front_use: T,
+    /// Slip angles behind the relaxation, and those they follow.
+    slip_rad: [T; 2],
+    steady_rad: [T; 2],
+}
+
+/// Accelerations of an instant.
+struct Rates<T> {
+    v_y_mps2: T,
+    yaw_radps2: T,
+    v_x_mps2: T,
+    a_y_mps2: T,
+    a_x_mps2: T,
+    memory: Memory<T>,
+}
+
+impl<T: Real> Mover<'_, '_, T> {
+    pub(crate) fn run(&self, start: [T; 2]) -> Outputs<T> {
+        let run = &self.model.recording.runs[self.window.segment];
+        let n = self.window.len;
+        let dt_s = run.dt_s;
+        let substeps = (dt_s / self.model.substep_s - 1e-9).ceil().max(1.0);
+        let h_s = dt_s / substeps;
+        let zero = T::from(0.0);
+        let mut out = Outputs {
+            dt_s,
+            v_y_mps: Vec::with_capacity(n),
+            yaw_rate_radps: Vec::with_capacity(n),
+            yaw_acceleration_radps2: Vec::with_capacity(n),
+            a_y_mps2: Vec::with_capacity(n),
+            a_x_mps2: Vec::with_capacity(n),
+            v_x_mps: Vec::with_capacity(n),
+            heading_rad: Vec::with_capacity(n),
+        };
+        let mut x = start;
+        let (mut speed, mut heading) = (zero, zero);
+        let mut rates = self.settled(x, h_s);
+        for k in 0..n {
+            out.v_y_mps.push(x[0]);
+            out.yaw_rate_radps.push(x[1]);
+            out.yaw_acceleration_radps2.push(rates.yaw_radps2);
+            out.a_y_mps2.push(rates.a_y_mps2);
+            out.a_x_mps2.push(rates.a_x_mps2);
+            out.v_x_mps.push(speed);
+            out.heading_rad.push(heading);
+            if k + 1 == n {
+                break;
+            }
+            for i in 0..substeps as usize {
+                let middle = self.instant(k, (i as f64 + 0.5) / substeps);
+                let half = [x[0] + rates.v_y_mps2 * (h_s / 2.0), x[1] + rates.yaw_radps2 * (h_s / 2.0)];
+                let there = self.rates(half, &middle, &rates.memory, h_s / 2.0);
+                x = [x[0] + there.v_y_mps2 * h_s, x[1] + there.yaw_radps2 * h_s];
+                speed += there.v_x_mps2 * h_s;
+                heading += half[1] * h_s;
+                let end = self.instant(k, (i as f64 + 1.0) / substeps);
+                rates = self.rates(x, &end, &rates.memory, h_s);
+            }
+        }
+        out
+    }
+
+    /// Rates at the start, as if the motion had gone on as it does there.
+    fn settled(&self, x: [T; 2], h_s: f64) -> Rates<T> {
+        let now = self.instant(0, 0.0);
+        let zero = T::from(0.0);
+        let a_y_mps2 = now.v_x_mps * x[1];
+        let mut memory = Memory {
+            a_y_mps2,
+            rolled_a_y_mps2: a_y_mps2,
+            front_use: zero,
+            slip_rad: [zero; 2],
+            steady_rad: [zero; 2],
+        };
+        // Without relaxation the slip is the steady one whatever the memory holds; the front use settles in three turns.
+        let relaxed = self.car.relaxation_m;
+        let still = Car { relaxation_m: zero, ..self.car };
+        let mut rates = self.rates_of(&still, x, &now, &memory, h_s);
+        for _ in 0..2 {
+            memory.front_use = rates.memory.front_use;
+            rates = self.rates_of(&still, x, &now, &memory, h_s);
+        }
+        if relaxed.re() == 0.0 && !self.model.effects.contains(&EffectId::TireRelaxation) {
+            return rates;
+        }
+        for _ in 0..2 {
+            let next = [x[0] + rates.v_y_mps2 * h_s, x[1] + rates.yaw_radps2 * h_s];
+            let end = self.instant(0, (h_s / self.model.recording.runs[self.window.segment].dt_s).min(1.0));
+            let ahead = self.rates_of(&still, next, &end, &rates.memory, h_s);
+            // As if the slip had been a ramp for long: it lags by one relaxation time.
+            memory = rates.memory;
+            for i in 0..2 {
+                let ramp = (ahead.memory.steady_rad[i] - memory.steady_rad[i]) / h_s;
+                memory.slip_rad[i] = memory.steady_rad[i] - ramp * relaxed / now.v_x_mps;
+            }
+            rates = self.rates_of(&self.car, x, &now, &memory, 0.0);
+        }
+        rates
+    }
+
+    fn instant(&self, k: usize, share: f64) -> Instant<T> {
+        let run = &self.model.recording.runs[self.window.segment];
+        let (a, b) = (self.window.from + k, (self.window.from + k + 1).min(run.len() - 1));
+        let next = (k + 1).min(self.steering.len() - 1);
+        let mix = |s: &[f64]| s[a] + (s[b] - s[a]) * share;
+        // The lap's end is not a place to interpolate across.
+        let lap = &run.lap_share;
+        let turn = lap[b] - lap[a];
+        Instant {
+            v_x_mps: self.car.speed_factor * mix(&run.v_x_mps),
+            steering_rad: self.steering[k] + (self.steering[next] - self.steering[k]) * share,
+            a_x_mps2: mix(&run.a_x_mps2),
+            force_x_mps2: run.force_x_mps2[a],
+            minutes: (run.time_s(a) + share * run.dt_s) / 60.0,
+            lap_share: lap[a] + (turn - turn.round()) * share,
+        }
+    }
+
+    fn rates(&self, x: [T; 2], now: &Instant<T>, memory: &Memory<T>, h_s: f64) -> Rates<T> {
+        self.rates_of(&self.car, x, now, memory, h_s)
+    }
+
+    /// Accelerations `h_s` after an instant that left `memory`.
+    fn rates_of(&self, car: &Car<T>, x: [T; 2], now: &Instant<T>, memory: &Memory<T>, h_s: f64) -> Rates<T> {
+        let model = self.model;
+        let [v_y, r] = x;
+        let v_x = if now.v_x_mps.re() < MIN_SPEED_MPS { T::from(MIN_SPEED_MPS) } else { now.v_x_mps };
+        let at = Moment {
+            v_x_mps: v_x,
+            yaw_rate_radps: r,
+            a_y_mps2: memory.a_y_mps2,
+            rolled_a_y_mps2: memory.rolled_a_y_mps2,
+            front_use: memory.front_use,
+            a_x_mps2: now.a_x_mps2,
+            force_x_mps2: now.force_x_mps2,
+            minutes: now.minutes,
+            lap_share: now.lap_share,
+            lap_m: model.recording.laps.lap_m,
+        };
+        let mut axles = car.axles_at_rest();
+        for (effect, values) in model.with_parameters(self.p) {
+            effect.loads(values, car, &at, &mut axles);
+        }
+        for (effect, values) in model.with_parameters(self.p) {
+            effect.grip(values, car, &at, &mut axles);
+        }
+        let front_rad = now.steering_rad + axles.front.steer_rad;
+        let steady_rad = [
+            front_rad - ((v_y + r * car.l_f_m) / v_x).atan(),
+            axles.rear.steer_rad - ((v_y - r * car.l_r_m) / v_x).atan(),
+        ];
+        let mut slip_rad = steady_rad;
+        if model.effects.contains(&EffectId::TireRelaxation) && car.relaxation_m.re() >= 0.0 {
+            let tau_s = car.relaxation_m / v_x;
+            for i in 0..2 {
+                slip_rad[i] = if h_s > 0.0 {
+                    lagged(memory.slip_rad[i], memory.steady_rad[i], steady_rad[i], h_s, tau_s)
+                } else {
+                    memory.slip_rad[i]
+                };
+            }
+        }
+        let force = |axle: &Axle<T>, tire: &gripsight_vehicle::MagicFormula<T>, slip: T| {
+            tire.normalized_force(slip / axle.grip) * axle.grip * axle.usable
+        };
+        let front_use = force(&axles.front, &self.tires.front, slip_rad[0]);
+        let rear_use = force(&axles.rear, &self.tires.rear, slip_rad[1]);
+        let (sin, cos) = now.steering_rad.sin_cos();
+        let front_n = front_use * axles.front.load_n;
+        let rear_n = rear_use * axles.rear.load_n;
+        let mut motion = Motion::none();
+        for (effect, values) in model.with_parameters(self.p) {
+            effect.motion(values, car, &at, &mut motion);
+        }
+        let commanded = model.recording.has_command;
+        // Force along the front wheels turns with them; it is known only where it is commanded.
+        let front_x_n = if commanded {
+            car.front_share(now.force_x_mps2 > 0.0) * now.force_x_mps2 * car.nominal_mass_kg
+        } else {
+            0.0
+        };
+        let front_y_n = if commanded { front_n * cos + sin * front_x_n } else { front_n * cos };
+        let mut a_y = (rear_n + front_y_n) / car.mass_kg + motion.force_y_mps2;
+        let mut yaw_radps2 = (front_y_n * car.l_f_m - rear_n * car.l_r_m) / car.yaw_inertia_kgm2 + motion.yaw_radps2;
+        if let Some(flexible) = &model.flexible {
+            let own = model.flexible_parameters(self.p);
+            let (more_y, more_yaw) = flexible.motion(own, &at, v_y, steady_rad, now.steering_rad);
+            a_y += more_y;
+            yaw_radps2 += more_yaw;
+        }
+        let a_x = if commanded {
+            (-(front_n * sin) + now.force_x_mps2 * car.nominal_mass_kg) / car.mass_kg + motion.force_x_mps2
+        } else {
+            T::from(now.a_x_mps2)
+        };
+        let rolled = if h_s > 0.0 {
+            lagged(memory.rolled_a_y_mps2, memory.a_y_mps2, a_y, h_s, T::from(ROLL_TIME_S))
+        } else {
+            memory.rolled_a_y_mps2
+        };
+        Rates {
+            v_y_mps2: a_y - now.v_x_mps * r + motion.gravity_y_mps2,
+            yaw_radps2,
+            v_x_mps2: a_x + v_y * r + motion.gravity_x_mps2,
+            a_y_mps2: a_y,
+            a_x_mps2: a_x,
+            memory: Memory { a_y_mps2: a_y, rolled_a_y_mps2: rolled, front_use, slip_rad, steady_rad },
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! Noise of a channel from its own fastest part.
+//!
+//! The difference of order p of white noise has the variance C(2p, p) sigma^2; the car's own motion hardly has one. Median over samples:
+//! knocks do not count. Coloured noise and filtered signals are underestimated; chi2 and floor are then relative to this figure,
+//! as the report says.
+
+use crate::recording::Run;
+use crate::smooth::median;
+
+/// Order of the difference.
+const ORDER: usize = 4;
+/// Binomial(2 ORDER, ORDER).
+const GAIN: f64 = 70.0;
+/// Median of the absolute value of a normal variable over its standard deviation.
+const MEDIAN_OF_NORMAL: f64 = 0.674_49;
+/// Noise is never taken below this share of the signal's standard deviation: rounding and derived signals.
+const LEAST_SHARE: f64 = 2e-3;
+
+/// Standard deviation of the noise of channel `c`.
+pub(crate) fn sigma(runs: &[Run], c: usize) -> f64 {
+    let mut sizes = Vec::new();
+    for run in runs {
+        let mut d = run.measured[c].clone();
+        for _ in 0..ORDER {
+            d = d.windows(2).map(|w| w[1] - w[0]).collect();
+        }
+        sizes.extend(d.iter().map(|v| v.abs()));
+    }
+    let noise = median(sizes) / MEDIAN_OF_NORMAL / GAIN.sqrt();
+    noise.max(LEAST_SHARE * spread(runs, c, true)).max(1e-6)
+}
+
+/// Time over which a channel that counts without its mean is looked at.
+const COURSE_S: f64 = 0.5;
+
+/// Standard deviation of channel `c`; with `course`, of its course over half a second.
+pub(crate) fn spread(runs: &[Run], c: usize, course: bool) -> f64 {
+    let (mut n, mut square) = (0.0, 0.0);
+    for run in runs {
+        let len = if course { ((COURSE_S / run.dt_s) as usize).max(2) } else { run.len().max(1) };
+        for part in run.measured[c].chunks(len) {
+            let mean = part.iter().sum::<f64>() / part.len() as f64;
+            n += part.len() as f64;
+            square += part.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+        }
+    }
+    if n > 0.0 { (square / n).sqrt() } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    #[test]
+    fn white_noise_on_a_moving_signal_is_measured() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+        let signal: Vec<f64> = (0..6000)
+            .map(|k| {
+                let noise: f64 = StandardNormal.sample(&mut random);
+                (f64::from(k) * 0.01 * 6.0).sin() + 0.02 * noise
+            })
+            .collect();
+        let n = signal.len();
+        let run = Run {
+            start_time_s: 0.0,
+            dt_s: 0.01,
+            v_x_mps: vec![1.0; n],
+            steering_rad: vec![0.0; n],
+            a_x_mps2: vec![0.0; n],
+            force_x_mps2: vec![0.0; n],
+            lap_share: vec![0.0; n],
+            measured: vec![signal],
+        };
+        approx::assert_relative_eq!(sigma(&[run], 0), 0.02, max_relative = 0.05);
+    }
+}

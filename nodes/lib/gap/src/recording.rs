@@ -1,0 +1,223 @@
+//! The telemetry as the diagnosis uses it: even stretches, the channels to be explained, and what goes into the model.
+
+use gripsight_signals::{Segment, StateSequence, segments};
+
+use crate::GapError;
+use crate::smooth::{local_quadratic, median, quantile};
+use crate::station::{Laps, stations};
+
+/// A signal that the model predicts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Channel {
+    /// Lateral velocity of the odometry.
+    LateralVelocity,
+    /// Yaw rate of the odometry.
+    YawRate,
+    /// Specific force to the left of the inertial unit.
+    LateralAcceleration,
+    /// Yaw rate of the gyroscope, where it is not the odometry's.
+    Gyro,
+    /// Heading, less its mean over a window, where the yaw rate was not derived from it.
+    Heading,
+    /// Specific force forward, with a longitudinal command.
+    LongitudinalAcceleration,
+    /// Forward speed, less its mean over a window, with a longitudinal command.
+    Speed,
+}
+
+impl Channel {
+    /// Every channel.
+    pub const ALL: [Self; 7] = [
+        Self::LateralVelocity,
+        Self::YawRate,
+        Self::LateralAcceleration,
+        Self::Gyro,
+        Self::Heading,
+        Self::LongitudinalAcceleration,
+        Self::Speed,
+    ];
+
+    /// Name with unit.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::LateralVelocity => "v_y_mps",
+            Self::YawRate => "yaw_rate_radps",
+            Self::LateralAcceleration => "a_y_mps2",
+            Self::Gyro => "gyro_yaw_rate_radps",
+            Self::Heading => "heading_rad",
+            Self::LongitudinalAcceleration => "a_x_mps2",
+            Self::Speed => "v_x_mps",
+        }
+    }
+
+    /// Whether only its course over a window counts, not its level.
+    pub(crate) fn without_mean(self) -> bool {
+        matches!(self, Self::Heading | Self::Speed)
+    }
+}
+
+/// An even stretch of the recording.
+#[derive(Debug, Clone)]
+pub(crate) struct Run {
+    pub(crate) start_time_s: f64,
+    pub(crate) dt_s: f64,
+    pub(crate) v_x_mps: Vec<f64>,
+    pub(crate) steering_rad: Vec<f64>,
+    pub(crate) a_x_mps2: Vec<f64>,
+    pub(crate) force_x_mps2: Vec<f64>,
+    pub(crate) lap_share: Vec<f64>,
+    /// Measured signals by channel, in the order of [`Recording::channels`].
+    pub(crate) measured: Vec<Vec<f64>>,
+}
+
+impl Run {
+    pub(crate) fn len(&self) -> usize {
+        self.v_x_mps.len()
+    }
+
+    pub(crate) fn time_s(&self, k: usize) -> f64 {
+        self.start_time_s + k as f64 * self.dt_s
+    }
+}
+
+/// A recording, ready to be diagnosed.
+#[derive(Debug, Clone)]
+pub struct Recording {
+    pub(crate) runs: Vec<Run>,
+    pub(crate) channels: Vec<Channel>,
+    pub(crate) sigma: Vec<f64>,
+    /// What residuals are divided by when fitting: noise, and a share of the signal's own size that no single-track model gets right.
+    pub(crate) weights: Vec<f64>,
+    pub(crate) laps: Laps,
+    pub(crate) has_command: bool,
+    pub(crate) recorded_s: f64,
+    pub(crate) least_speed_mps: f64,
+    pub(crate) identities: Vec<crate::Identity>,
+}
+
+/// Stretches shorter than this are left out.
+const SHORTEST_S: f64 = 1.5;
+/// Speed and longitudinal acceleration are smoothed over this time to each side.
+const SMOOTH_S: f64 = 0.06;
+
+/// Share of a signal's size that a single-track model is not expected to get right.
+const MODEL_SHARE: f64 = 0.02;
+
+impl Recording {
+    /// Prepares a recording.
+    ///
+    /// # Errors
+    /// What is wrong with the telemetry; [`GapError::TooCoarse`] below 15 Hz.
+    pub fn new(sequence: &StateSequence) -> Result<Self, GapError> {
+        const LEAST_RATE_HZ: f64 = 15.0;
+        let parts = segments(sequence, SHORTEST_S)?;
+        let recorded_s = sequence.duration_s();
+        let all_v: Vec<f64> = parts.iter().flat_map(|s| s.v_x_mps.iter().copied()).collect();
+        let least_speed_mps = (0.25 * quantile(all_v, 0.9)).max(0.5);
+        let Some(first) = parts.first() else {
+            return Err(GapError::TooLittle { usable_s: 0.0, recorded_s, needed_s: crate::windows::NEEDED_S, least_speed_mps });
+        };
+        let dt_s = first.dt_s;
+        if dt_s > 1.0 / LEAST_RATE_HZ {
+            return Err(GapError::TooCoarse { rate_hz: 1.0 / dt_s, needed_hz: LEAST_RATE_HZ });
+        }
+        let laps = stations(&parts);
+        let has_command = !first.command_acceleration_mps2.is_empty();
+        let identities = crate::identities::check(&parts);
+        let channels = channels(first, has_command, &identities);
+        let runs: Vec<Run> =
+            parts.iter().zip(&laps.share).map(|(s, share)| run(s, share, &channels)).collect();
+        let sigma: Vec<f64> = (0..channels.len()).map(|c| crate::noise::sigma(&runs, c)).collect();
+        let weights = sigma
+            .iter()
+            .enumerate()
+            .map(|(c, s)| s.hypot(MODEL_SHARE * crate::noise::spread(&runs, c, channels[c].without_mean())))
+            .collect();
+        Ok(Self { runs, channels, sigma, weights, laps, has_command, recorded_s, least_speed_mps, identities })
+    }
+
+    /// The channels that are explained.
+    #[must_use]
+    pub fn channels(&self) -> &[Channel] {
+        &self.channels
+    }
+
+    /// Standard deviation of each channel's noise.
+    #[must_use]
+    pub fn noise(&self) -> &[f64] {
+        &self.sigma
+    }
+
+    pub(crate) fn dt_s(&self) -> f64 {
+        self.runs.first().map_or(0.01, |r| r.dt_s)
+    }
+
+    /// Median speed of the samples that count.
+    pub(crate) fn typical_speed_mps(&self) -> f64 {
+        let fast = self.runs.iter().flat_map(|r| r.v_x_mps.iter().copied()).filter(|v| *v > self.least_speed_mps);
+        median(fast.collect())
+    }
+}
+
+/// Which channels there are, and say something of their own.
+fn channels(segment: &Segment, has_command: bool, identities: &[crate::Identity]) -> Vec<Channel> {
+    let independent = |name: &str| identities.iter().any(|i| i.name == name && i.informative);
+    let has = |c: Channel| match c {
+        Channel::LateralVelocity | Channel::YawRate => true,
+        Channel::LateralAcceleration => !segment.a_y_mps2.is_empty(),
+        Channel::Gyro => {
+            !segment.gyro_yaw_rate_radps.is_empty()
+                && differs(&segment.gyro_yaw_rate_radps, &segment.yaw_rate_radps)
+        }
+        Channel::Heading => !segment.yaw_rad.is_empty() && independent(crate::identities::HEADING),
+        Channel::LongitudinalAcceleration => has_command && !segment.a_x_mps2.is_empty(),
+        Channel::Speed => has_command,
+    };
+    Channel::ALL.into_iter().filter(|&c| has(c)).collect()
+}
+
+/// Whether two recordings of one quantity are two measurements: they differ by more than a part of their own fastest changes.
+fn differs(a: &[f64], b: &[f64]) -> bool {
+    const SHARE: f64 = 0.3;
+    let apart = median(a.iter().zip(b).map(|(x, y)| (x - y).abs()).collect());
+    let fast = median(a.windows(3).map(|w| (w[2] - 2.0 * w[1] + w[0]).abs()).collect()) / 6_f64.sqrt();
+    apart > SHARE * fast
+}
+
+fn run(s: &Segment, lap_share: &[f64], channels: &[Channel]) -> Run {
+    let half = (SMOOTH_S / s.dt_s).round().max(1.0) as usize;
+    let (v_x_mps, v_x_rate) = local_quadratic(&s.v_x_mps, half, s.dt_s);
+    let a_x_mps2 = if s.a_x_mps2.is_empty() {
+        (0..s.len()).map(|k| v_x_rate[k] - s.v_y_mps[k] * s.yaw_rate_radps[k]).collect()
+    } else {
+        local_quadratic(&s.a_x_mps2, half, s.dt_s).0
+    };
+    let force_x_mps2 = if s.command_acceleration_mps2.is_empty() {
+        a_x_mps2.clone()
+    } else {
+        s.command_acceleration_mps2.clone()
+    };
+    let measured = channels
+        .iter()
+        .map(|c| match c {
+            Channel::LateralVelocity => s.v_y_mps.clone(),
+            Channel::YawRate => s.yaw_rate_radps.clone(),
+            Channel::LateralAcceleration => s.a_y_mps2.clone(),
+            Channel::Gyro => s.gyro_yaw_rate_radps.clone(),
+            Channel::Heading => s.yaw_rad.clone(),
+            Channel::LongitudinalAcceleration => s.a_x_mps2.clone(),
+            Channel::Speed => s.v_x_mps.clone(),
+        })
+        .collect();
+    Run {
+        start_time_s: s.start_time_s,
+        dt_s: s.dt_s,
+        v_x_mps,
+        steering_rad: s.steering_rad.clone(),
+        a_x_mps2,
+        force_x_mps2,
+        lap_share: lap_share.to_vec(),
+        measured,
+    }
+}

@@ -1,0 +1,199 @@
+//! What the effects' hooks see and change: the terms of the equations of motion.
+
+use gripsight_vehicle::{GRAVITY_MPS2, Real, VehicleParameters};
+
+/// Constants of the car.
+#[derive(Debug, Clone, Copy)]
+pub struct Car<T> {
+    /// Mass.
+    pub mass_kg: T,
+    /// Mass that the vehicle file states: what commanded accelerations refer to.
+    pub nominal_mass_kg: f64,
+    /// Yaw inertia.
+    pub yaw_inertia_kgm2: T,
+    /// Centre of gravity to front axle.
+    pub l_f_m: T,
+    /// Centre of gravity to rear axle.
+    pub l_r_m: T,
+    /// How far the true centre of gravity lies ahead of the nominal one, where the sensors are.
+    pub cog_shift_m: T,
+    /// Relaxation length of the tires; 0: none.
+    pub relaxation_m: T,
+    /// True forward speed over the reported one.
+    pub speed_factor: T,
+    /// Grip of the front and the rear axle, D of the Magic Formula.
+    pub peak: [T; 2],
+    /// Share of drive and brake force at the front axle.
+    pub drive_front_share: f64,
+    /// Share of the brake force at the front axle.
+    pub brake_front_share: f64,
+}
+
+impl<T: Real> Car<T> {
+    /// The car as the vehicle file states it.
+    pub(crate) fn nominal(vehicle: &VehicleParameters, peak: [T; 2]) -> Self {
+        Self {
+            mass_kg: T::from(vehicle.mass_kg),
+            nominal_mass_kg: vehicle.mass_kg,
+            yaw_inertia_kgm2: T::from(vehicle.yaw_inertia_kgm2),
+            l_f_m: T::from(vehicle.l_f_m),
+            l_r_m: T::from(vehicle.l_r_m),
+            cog_shift_m: T::from(0.0),
+            relaxation_m: T::from(0.0),
+            speed_factor: T::from(1.0),
+            peak,
+            drive_front_share: vehicle.drive_front_share,
+            brake_front_share: vehicle.brake_front_share,
+        }
+    }
+
+    /// Distance between the axles.
+    pub fn wheelbase_m(&self) -> T {
+        self.l_f_m + self.l_r_m
+    }
+
+    /// The axles at rest.
+    pub(crate) fn axles_at_rest(&self) -> Axles<T> {
+        let weight_n = self.mass_kg * GRAVITY_MPS2;
+        let axle = |load_n| Axle { load_n, steer_rad: T::from(0.0), grip: T::from(1.0), usable: T::from(1.0) };
+        Axles {
+            front: axle(weight_n * self.l_r_m / self.wheelbase_m()),
+            rear: axle(weight_n * self.l_f_m / self.wheelbase_m()),
+        }
+    }
+
+    /// Share of the longitudinal force at the front axle.
+    pub fn front_share(&self, driving: bool) -> f64 {
+        if driving { self.drive_front_share } else { self.brake_front_share }
+    }
+
+    /// The largest lateral acceleration that the tires give with these loads.
+    pub fn largest_a_y_mps2(&self, axles: &Axles<T>) -> T {
+        (self.peak[0] * axles.front.load_n + self.peak[1] * axles.rear.load_n) / self.mass_kg
+    }
+}
+
+/// One axle at an instant.
+#[derive(Debug, Clone, Copy)]
+pub struct Axle<T> {
+    /// Vertical load.
+    pub load_n: T,
+    /// Steering angle on top of the driver's.
+    pub steer_rad: T,
+    /// Factor on D at constant cornering stiffness.
+    pub grip: T,
+    /// Factor on the lateral force.
+    pub usable: T,
+}
+
+/// Both axles at an instant.
+#[derive(Debug, Clone, Copy)]
+pub struct Axles<T> {
+    /// Front axle.
+    pub front: Axle<T>,
+    /// Rear axle.
+    pub rear: Axle<T>,
+}
+
+/// What is known of an instant before the tires are asked.
+#[derive(Debug, Clone, Copy)]
+pub struct Moment<T> {
+    /// Forward speed.
+    pub v_x_mps: T,
+    /// Yaw rate.
+    pub yaw_rate_radps: T,
+    /// Lateral acceleration from the tires, a moment ago.
+    pub a_y_mps2: T,
+    /// The same behind the roll of the body.
+    pub rolled_a_y_mps2: T,
+    /// F_y/F_z of the front axle, a moment ago.
+    pub front_use: T,
+    /// Longitudinal acceleration (specific force).
+    pub a_x_mps2: f64,
+    /// Commanded longitudinal force over the nominal mass, or its stand-in, the longitudinal acceleration.
+    pub force_x_mps2: f64,
+    /// Time since the start of the recording.
+    pub minutes: f64,
+    /// Distance along the lap over the lap's length, in 0..1; 0 without laps.
+    pub lap_share: f64,
+    /// Length of the lap; 0 without laps.
+    pub lap_m: f64,
+}
+
+/// Accelerations from outside the tires.
+#[derive(Debug, Clone, Copy)]
+pub struct Motion<T> {
+    /// On v_x and on an accelerometer alike (drag, rolling resistance).
+    pub force_x_mps2: T,
+    /// On v_x alone (gravity along the road).
+    pub gravity_x_mps2: T,
+    /// On v_y alone (gravity across the road).
+    pub gravity_y_mps2: T,
+    /// On v_y and on an accelerometer alike.
+    pub force_y_mps2: T,
+    /// On the yaw rate.
+    pub yaw_radps2: T,
+}
+
+impl<T: Real> Motion<T> {
+    pub(crate) fn none() -> Self {
+        let zero = T::from(0.0);
+        Self {
+            force_x_mps2: zero,
+            gravity_x_mps2: zero,
+            gravity_y_mps2: zero,
+            force_y_mps2: zero,
+            yaw_radps2: zero,
+        }
+    }
+}
+
+/// The motion of the car over a window, sample by sample, on its way to the recorded signals.
+#[derive(Debug, Clone)]
+pub struct Outputs<T> {
+    /// Step between samples.
+    pub dt_s: f64,
+    /// Lateral velocity at the odometry's point.
+    pub v_y_mps: Vec<T>,
+    /// Yaw rate of odometry and gyroscope.
+    pub yaw_rate_radps: Vec<T>,
+    /// Yaw acceleration.
+    pub yaw_acceleration_radps2: Vec<T>,
+    /// Specific force to the left.
+    pub a_y_mps2: Vec<T>,
+    /// Specific force forward.
+    pub a_x_mps2: Vec<T>,
+    /// Forward speed, but for a constant.
+    pub v_x_mps: Vec<T>,
+    /// Heading, but for a constant.
+    pub heading_rad: Vec<T>,
+}
+
+/// A first-order lag over a step in which its input is linear: exact, and at `tau_s` = 0 exactly the input, with the right derivative.
+///
+/// tau y' + y = u,  u = u0 + s t:  y(h) = u1 - s tau + (y0 - u0 + s tau) exp(-h/tau)
+pub(crate) fn lagged<T: Real>(y0: T, u0: T, u1: T, h_s: f64, tau_s: T) -> T {
+    let ramp = (u1 - u0) / h_s * tau_s;
+    let settled = u1 - ramp;
+    if tau_s.re() < h_s / 30.0 { settled } else { settled + (y0 - u0 + ramp) * (-(tau_s.recip() * h_s)).exp() }
+}
+
+/// A series `delay_s` later, linear between samples; before the first sample it is taken as going on straight.
+pub(crate) fn delayed<T: Real>(series: &[T], delay_s: T, dt_s: f64) -> Vec<T> {
+    let n = series.len();
+    if n < 2 {
+        return series.to_vec();
+    }
+    let shift = delay_s / dt_s;
+    (0..n)
+        .map(|k| {
+            if shift.re().abs() < 1e-9 {
+                let (a, b) = (k.saturating_sub(1), (k + 1).min(n - 1));
+                return series[k] - (series[b] - series[a]) / (b - a) as f64 * shift;
+            }
+            let place = -shift + k as f64;
+            let left = (place.re().floor().max(0.0) as usize).min(n - 2);
+            series[left] + (series[left + 1] - series[left]) * (place - left as f64)
+        })
+        .collect()
+}
