@@ -240,7 +240,7 @@ impl Effect {
             Self::OdometryDelay { delay_s } => delay(odometry, delay_s),
             Self::OdometryLowPass { tau_s } => low_pass(odometry, tau_s),
             Self::ForwardVelocityScale { scale } => {
-                odometry.iter_mut().for_each(|m| m.v_x_mps *= 1.0 + scale)
+                odometry.iter_mut().for_each(|m| m.v_x_mps *= 1.0 + scale);
             }
             Self::ImuLeverArm { x_m, y_m } => {
                 let yaw_accelerations_radps2 = yaw_accelerations_radps2(imu);

@@ -186,7 +186,27 @@ pub enum BagError {
         /// What is wrong.
         error: SignalError,
     },
-    /// A setting is wrong, or the samples are too few to work on.
+    /// Streams that do not meet: hardly an odometry message has a drive command in force.
+    #[error(
+        "{}: {odometry} odometry and {drive} drive messages give {aligned} samples ({without_drive} odometry messages without \
+         a drive command in force, {duplicates} messages with a stamp seen before); both topics need header stamps of one clock",
+        path.display()
+    )]
+    NothingAligned {
+        /// The bag.
+        path: PathBuf,
+        /// Odometry messages.
+        odometry: usize,
+        /// Drive messages.
+        drive: usize,
+        /// Samples that could be made.
+        aligned: usize,
+        /// Odometry messages without a drive command in force.
+        without_drive: usize,
+        /// Messages with a stamp seen before.
+        duplicates: usize,
+    },
+    /// A setting is wrong, or recorded sequences do not hold together.
     #[error(transparent)]
     Samples(#[from] SignalError),
     /// The topics file does not read.

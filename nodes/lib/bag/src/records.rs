@@ -44,7 +44,7 @@ fn step(source: &mut impl Read, body: &mut Vec<u8>) -> io::Result<Step> {
 
 /// The chunk being unpacked.
 struct Chunk {
-    records: HashingRead,
+    records: BufReader<HashingRead>,
     expected_crc: u32,
     /// Whether the file ends inside it.
     cut: bool,
@@ -168,11 +168,9 @@ impl Records {
                 Some(chunk) => self.advance_in_chunk(chunk)?,
                 None => Some(self.advance_in_file()?),
             };
-            match opcode {
-                Some(matters @ (op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::FOOTER)) => {
-                    return Ok(matters);
-                }
-                _ => {}
+            if let Some(matters @ (op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::FOOTER)) = opcode
+            {
+                return Ok(matters);
             }
         }
     }
@@ -218,7 +216,7 @@ impl Records {
             _ => return Err(BagError::Compression { path: self.path.clone(), at: self.at, compression }),
         };
         let inner: Box<dyn Read + Send> = Box::new(records.take(uncompressed_len));
-        let records = HashingRead { inner, crc: crc32fast::Hasher::new() };
+        let records = BufReader::new(HashingRead { inner, crc: crc32fast::Hasher::new() });
         Ok(Chunk { records, expected_crc, cut })
     }
 
@@ -234,7 +232,7 @@ impl Records {
             }
             _ if chunk.cut => Err(self.truncated()),
             Ok(Step::End) => {
-                let found = chunk.records.crc.finalize();
+                let found = chunk.records.into_inner().crc.finalize();
                 if chunk.expected_crc != 0 && chunk.expected_crc != found {
                     let expected = chunk.expected_crc;
                     return Err(

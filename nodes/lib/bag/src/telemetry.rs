@@ -109,7 +109,14 @@ pub(crate) fn sequences_of(
     report.without_drive = aligner.without_drive();
     report.duplicates = aligner.duplicates();
     if sequences.is_empty() {
-        sequences.push(cutter.rest()?);
+        sequences.push(cutter.rest().map_err(|_| BagError::NothingAligned {
+            path: bag.path().to_owned(),
+            odometry: report.counts[0],
+            drive: report.counts[1],
+            aligned: cutter.buffered(),
+            without_drive: report.without_drive,
+            duplicates: report.duplicates,
+        })?);
     }
     Ok((sequences, report))
 }

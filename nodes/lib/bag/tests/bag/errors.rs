@@ -74,7 +74,7 @@ fn several_topics_of_one_type() {
     let topics = TopicMap { odom: Some("/odom".to_owned()), ..TopicMap::default() };
     // The one message of each topic is then too little to work on, which is the next thing to say.
     let error = read_with(&bytes, &topics);
-    assert!(matches!(error, BagError::Samples(SignalError::TooShort { got: 1, .. })), "{error}");
+    assert!(matches!(error, BagError::NothingAligned { aligned: 1, .. }), "{error}");
 }
 
 #[test]
@@ -192,6 +192,24 @@ fn samples_that_are_not_numbers_or_go_back() {
     let error = write("back.mcap", &|k, s| s.stamp_ns -= if k == 30 { 50_000_000 } else { 0 });
     assert!(
         matches!(&error, BagError::Signal { error: SignalError::StampWentBack { index: 30, .. }, .. }),
+        "{error}"
+    );
+}
+
+#[test]
+fn streams_on_different_clocks() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("clocks.mcap");
+    let mut writer = BagWriter::create(&path).unwrap();
+    for k in 0..50 {
+        let unstamped = gripsight_signals::DriveSample { stamp_ns: 0, ..drive(k) };
+        writer.write("/odom", odometry(k).stamp_ns, &encode::odometry(&odometry(k))).unwrap();
+        writer.write("/drive", odometry(k).stamp_ns, &encode::drive(&unstamped)).unwrap();
+    }
+    writer.finish().unwrap();
+    let error = read_sequences(&path, &TopicMap::default(), WHOLE).unwrap_err();
+    assert!(
+        matches!(error, BagError::NothingAligned { aligned: 0, without_drive: 50, duplicates: 49, .. }),
         "{error}"
     );
 }
