@@ -52,7 +52,8 @@ pub(crate) struct Driver {
     max_steering_rad: f64,
     understeer_rad_per_mps2: f64,
     l_f_m: f64,
-    peak_slip_rad: f64,
+    l_r_m: f64,
+    peak_slip_rad: [f64; 2],
     duration_s: f64,
     dither_rad: f64,
     dither: [(f64, f64); 6],
@@ -105,8 +106,10 @@ impl Driver {
             max_steering_rad: car.max_steering_rad,
             understeer_rad_per_mps2: understeer(car),
             l_f_m: car.l_f_m,
-            peak_slip_rad: PEAK_SLIP * scenario.friction.nominal() * car.tire_front.grip
-                / car.tire_front.cornering_stiffness_per_rad,
+            l_r_m: car.l_r_m,
+            peak_slip_rad: [car.tire_front, car.tire_rear].map(|tire| {
+                PEAK_SLIP * scenario.friction.nominal() * tire.grip / tire.cornering_stiffness_per_rad
+            }),
             duration_s: scenario.duration_s,
             dither_rad: settings.dither_rad,
             dither,
@@ -168,7 +171,6 @@ impl Driver {
         let (along, across) = (cos * dx + sin * dy, cos * dy - sin * dx);
         let curvature = 2.0 * across / (along * along + across * across).max(1e-9);
         let mut steering_rad = (self.wheelbase_m * curvature).atan();
-        let slip_rad = view.v_y_mps.atan2(view.v_x_mps.max(0.1));
         if kind == DriverKind::Profile {
             let wanted = curvature * view.v_x_mps;
             let late = wanted - view.yaw_rate_radps;
@@ -176,21 +178,23 @@ impl Driver {
             steering_rad += 0.25 * self.wheelbase_m * late / view.v_x_mps.max(1.0);
             // More slip than the front tires' peak only scrubs.
             let front = (view.v_y_mps + self.l_f_m * view.yaw_rate_radps).atan2(view.v_x_mps.max(0.1));
-            steering_rad = steering_rad.clamp(front - self.peak_slip_rad, front + self.peak_slip_rad);
+            steering_rad = steering_rad.clamp(front - self.peak_slip_rad[0], front + self.peak_slip_rad[0]);
         }
         let wide = view.place.offset_m.abs() / track.half_width_m();
-        let sliding = (slip_rad.abs() - 0.2).max(0.0) * 3.0 + (wide - 0.8).max(0.0) * 0.5;
+        let rear = (view.v_y_mps - self.l_r_m * view.yaw_rate_radps).atan2(view.v_x_mps.max(0.1)).abs();
+        let sliding = 2.0 * (rear / self.peak_slip_rad[1] - 0.6).max(0.0) + (wide - 0.8).max(0.0) * 0.5;
         let fast = (view.v_x_mps / speed_mps.max(0.1) - 1.1).max(0.0);
-        (steering_rad, (1.0 - sliding - fast).clamp(0.3, 1.0))
+        (steering_rad, (1.0 - sliding - fast).clamp(0.1, 1.0))
     }
 
     fn finish(&self, view: &View, steering_rad: f64, speed_mps: f64, slope_mps2: f64, room: f64) -> Command {
         let limits = &self.limits;
         let asked = slope_mps2 * room + SPEED_GAIN_1PS * (speed_mps - view.v_x_mps);
-        let a_y = view.v_x_mps * view.yaw_rate_radps;
-        let left = limits.left_beside(a_y).max(0.15);
+        let left = limits.left_beside(view.v_x_mps * view.yaw_rate_radps);
         let drive = limits.drive_mps2.min(limits.power_w_per_kg / view.v_x_mps.max(0.1));
-        let acceleration = asked.clamp(-limits.brake_mps2 * left, drive * left * room);
+        // Cornering alone slows the car: some drive must always be left.
+        let most = drive * left.max(0.3) * room;
+        let acceleration = asked.clamp(-limits.brake_mps2 * left.max(0.1) * room, most);
         let dither =
             self.dither.iter().map(|(hz, phase)| (TAU * hz * view.time_s + phase).sin()).sum::<f64>() / 2.0;
         let steering_rad = steering_rad + self.dither_rad * dither;

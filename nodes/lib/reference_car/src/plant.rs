@@ -270,10 +270,10 @@ impl Plant {
         let per_nm = self.load_shift_share / (2.0 * half);
         let (front_shift, rear_shift) = (front_nm * per_nm, rear_nm * per_nm);
         let loads = [
-            front_n / 2.0 - front_shift,
-            front_n / 2.0 + front_shift,
-            rear_n / 2.0 - rear_shift,
-            rear_n / 2.0 + rear_shift,
+            (front_n / 2.0 - front_shift).max(0.0),
+            (front_n / 2.0 + front_shift).max(0.0),
+            (rear_n / 2.0 - rear_shift).max(0.0),
+            (rear_n / 2.0 + rear_shift).max(0.0),
         ];
         (front_nm, rear_nm, loads)
     }

@@ -6,6 +6,9 @@
 use crate::car::{CarParameters, GRAVITY_MPS2};
 use crate::track::Track;
 
+/// Share of the longitudinal limit that a driver plans with.
+const CAUTION: f64 = 0.85;
+
 /// What the driver believes of the car and takes from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Limits {
@@ -22,14 +25,21 @@ impl Limits {
     pub(crate) fn new(car: &CarParameters, mu: f64, pace: f64, trail_braking: bool) -> Self {
         let grip = mu * pace * car.tire_front.grip.min(car.tire_rear.grip);
         let (front, rear) = (car.l_r_m / car.wheelbase_m(), car.l_f_m / car.wheelbase_m());
-        // The axle that is asked for more than its load carries gives the limit.
-        let usable = |front_share: f64| {
-            (front / front_share.max(1e-9)).min(rear / (1.0 - front_share).max(1e-9)).min(1.0) * grip * 0.9
+        // The axle that is asked for more than its load carries gives the limit; `shift` is the load that moves to the
+        // front per g of acceleration.
+        let usable = |front_share: f64, shift: f64| {
+            let limit = |load: f64, share: f64, gain: f64| {
+                let left = share - grip * gain;
+                if left > 1e-6 { grip * load / left } else { f64::INFINITY }
+            };
+            let most = limit(front, front_share, shift).min(limit(rear, 1.0 - front_share, -shift));
+            most.min(grip) * CAUTION
         };
+        let shift = car.h_cg_m / car.wheelbase_m();
         Self {
             lateral_mps2: grip * GRAVITY_MPS2,
-            drive_mps2: GRAVITY_MPS2 * usable(car.drive.drive_front_share).min(car.drive.drive_limit),
-            brake_mps2: GRAVITY_MPS2 * usable(car.drive.brake_front_share).min(car.drive.brake_limit),
+            drive_mps2: GRAVITY_MPS2 * usable(car.drive.drive_front_share, -shift).min(car.drive.drive_limit),
+            brake_mps2: GRAVITY_MPS2 * usable(car.drive.brake_front_share, shift).min(car.drive.brake_limit),
             power_w_per_kg: car.drive.power_w / car.mass_kg,
             top_speed_mps: car.top_speed_mps,
             exponent: if trail_braking { 2.0 } else { 1.0 },

@@ -1,7 +1,5 @@
 //! The road and the air around the car: friction under each wheel, bank, slope, wind.
 
-use std::f64::consts::TAU;
-
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -100,12 +98,14 @@ impl Road {
             .product()
     }
 
-    /// Bank and slope: on a lap, a bank over half of it and as much up as down; on a plane, the same everywhere.
+    /// Bank and slope: on a lap, a banked stretch of half its length, and as much uphill as downhill; on a plane, the same
+    /// everywhere.
     fn inclination(&self, station_m: f64) -> (f64, f64) {
         match self.lap_m {
             Some(lap_m) => {
-                let turn = TAU * station_m / lap_m;
-                (self.bank_rad * 0.5 * (1.0 - turn.cos()), self.slope_rad * turn.sin())
+                let share = station_m / lap_m;
+                let climb = stretch(share, 0.05, 0.45) - stretch(share, 0.55, 0.95);
+                (self.bank_rad * stretch(share, 0.2, 0.7), self.slope_rad * climb)
             }
             None => (self.bank_rad, self.slope_rad),
         }
@@ -121,4 +121,10 @@ impl Road {
         }
         (self.gusts[0], self.wind_mps + self.gusts[1])
     }
+}
+
+/// One between two shares of a lap, zero outside, with smooth edges a tenth of a lap wide inside.
+fn stretch(share: f64, from: f64, to: f64) -> f64 {
+    let inside = ((share - from).min(to - share) / 0.1).clamp(0.0, 1.0);
+    inside * inside * (3.0 - 2.0 * inside)
 }
