@@ -31,7 +31,7 @@ mod writer;
 pub use bag::{Bag, Messages, RawMessage, Topic};
 pub use cdr::{from_cdr, to_cdr};
 pub use error::BagError;
-pub use info::{BagInfo, TopicInfo, info};
+pub use info::{BagInfo, TopicInfo, Usable, info};
 pub use inject::inject;
 pub use recover::{Recovered, recover};
 pub use sequence::{
