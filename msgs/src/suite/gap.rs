@@ -72,7 +72,7 @@ pub struct GapReport {
     pub header: Header,
     /// The sequence that this is about.
     pub handshake: Handshake,
-    /// Effects, tire_retune_only, no_gap, none_of_these or not_identifiable.
+    /// One of effects, tire_retune_only, no_gap, none_of_these or not_identifiable.
     pub verdict: String,
     /// Ranked, the most likely first.
     pub effects: Vec<GapEffect>,

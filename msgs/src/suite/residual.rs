@@ -16,7 +16,7 @@ pub struct ResidualModel {
     pub front: MagicFormula,
     /// Rear tires that the residual is relative to.
     pub rear: MagicFormula,
-    /// S4, mlp, rnn or none.
+    /// One of s4, mlp, rnn or none.
     pub architecture: String,
     /// Channels (s4), width of the hidden layers (mlp, rnn).
     pub d_model: u32,

@@ -1,3 +1,10 @@
-//! Node: an MCAP bag to its topics and /clock.
+//! Node: a bag to its topics and `/clock`. See the README beside this folder.
 
-fn main() {}
+mod diagnostics;
+mod node;
+mod pace;
+mod source;
+
+fn main() -> anyhow::Result<()> {
+    gripsight_runtime::run("bag_player", node::setup)
+}

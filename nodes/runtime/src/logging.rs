@@ -28,12 +28,13 @@ pub(crate) fn start(args: &Args) -> mpsc::Receiver<Log> {
     receiver
 }
 
-/// `RUST_LOG`, or what `--log-level` says; the DDS libraries speak only of errors unless asked.
+/// `RUST_LOG`, or what `--log-level` says. The DDS libraries are silent unless asked
+/// (`--log-level rustdds:=warn`): what matters of theirs is in the diagnostics.
 fn filter(args: &Args) -> EnvFilter {
     if let Ok(filter) = EnvFilter::try_from_default_env() {
         return filter;
     }
-    let mut directives = String::from("info,rustdds=error,ros2_client=error");
+    let mut directives = String::from("info,rustdds=off,ros2_client=off");
     for (logger, level) in &args.log_levels {
         let separator = if logger.is_some() { "=" } else { "" };
         let logger = logger.as_deref().unwrap_or_default();
