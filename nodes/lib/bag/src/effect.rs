@@ -199,6 +199,27 @@ impl Effect {
         if wrong { Err(format!("the {what} cannot be {value}")) } else { Ok(()) }
     }
 
+    /// Its name in the table.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        let place = match self {
+            Self::SteeringDelay { .. } => 0,
+            Self::SteeringGain { .. } => 1,
+            Self::SteeringOffset { .. } => 2,
+            Self::SteeringLag { .. } => 3,
+            Self::GyroScale { .. } => 4,
+            Self::GyroBias { .. } => 5,
+            Self::LateralVelocityLeverArm { .. } => 6,
+            Self::LateralVelocityBias { .. } => 7,
+            Self::OdometryDelay { .. } => 8,
+            Self::OdometryLowPass { .. } => 9,
+            Self::ForwardVelocityScale { .. } => 10,
+            Self::ImuLeverArm { .. } => 11,
+            Self::ImuTilt { .. } => 12,
+        };
+        EFFECTS[place].0
+    }
+
     /// The stream that must be recorded for the effect to show.
     #[must_use]
     pub fn stream(&self) -> Role {
@@ -441,6 +462,7 @@ mod tests {
     fn nothing_else_changes_and_the_null_value_changes_nothing() {
         for (name, _) in EFFECTS {
             assert_eq!(with(&format!("{name}=0")), series(), "{name}");
+            assert_eq!(format!("{name}=0").parse::<Effect>().unwrap().name(), name);
         }
         let changed = with("v_y_bias=0.1");
         assert_eq!((changed.drive, changed.imu), (series().drive, series().imu));

@@ -26,14 +26,17 @@ pub fn inject(bag: &Path, topics: &TopicMap, effects: &[Effect], out: &Path) -> 
     refuse_same(bag.files(), bag.path(), out)?;
     if let Some(topic) = topics.resolve_sequence(&bag)? {
         let why = format!("{topic} holds sequences that are cut already; inject into the recording itself");
-        return Err(BagError::Effect { given: format!("{effects:?}"), why });
+        return Err(BagError::Effect {
+            given: effects.iter().map(Effect::name).collect::<Vec<_>>().join(", "),
+            why,
+        });
     }
     let streams = topics.resolve(&bag)?;
     for effect in effects {
         let role = effect.stream();
         if streams.topic(role).is_none() {
             let why = format!("the bag holds no {} ({})", role.name(), role.type_name());
-            return Err(BagError::Effect { given: format!("{effect:?}"), why });
+            return Err(BagError::Effect { given: effect.name().to_owned(), why });
         }
     }
     let recorded = read_series(&bag, &streams)?;

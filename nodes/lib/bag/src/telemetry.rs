@@ -16,6 +16,7 @@ pub struct ReadReport {
     /// Where each stream was found.
     pub streams: Streams,
     /// Messages by stream, in the order of [`Role::ALL`].
+    #[serde(serialize_with = "crate::topics::by_role")]
     pub counts: [usize; 4],
     /// Messages that said nothing about their stream: joints that are not the four wheels, sensors that report "not measured".
     pub without_content: usize,

@@ -113,7 +113,7 @@ impl TopicMap {
 }
 
 /// The topics that a bag's streams were found under.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Streams {
     names: [Option<String>; 4],
 }
@@ -130,6 +130,21 @@ impl Streams {
     pub fn role(&self, topic: &str) -> Option<Role> {
         Role::ALL.into_iter().find(|&role| self.topic(role) == Some(topic))
     }
+}
+
+impl Serialize for Streams {
+    /// As a map from the stream's name to its topic.
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        by_role(&self.names, serializer)
+    }
+}
+
+/// Writes one value for each stream as a map from the stream's name.
+pub(crate) fn by_role<T: Serialize, S: serde::Serializer>(
+    values: &[T; 4],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(Role::ALL.into_iter().map(Role::name).zip(values))
 }
 
 fn find(
