@@ -109,7 +109,7 @@ impl ResidualNetwork {
     /// in physical units. S4D layers convolve by FFT.
     ///
     /// # Errors
-    /// If `inputs` is empty, not a multiple of the number of channels, or not finite.
+    /// If `inputs` is empty, not a multiple of the number of channels, or not finite; or if the output overflows.
     pub fn forward_sequence(&self, inputs: &[f64]) -> Result<Vec<f64>, Error> {
         if inputs.is_empty() {
             return Err(Error::Empty { what: "input sequence" });
@@ -124,6 +124,7 @@ impl ResidualNetwork {
         for (row, scale) in outputs.chunks_exact_mut(length).zip(&self.normalization.output_scale) {
             row.iter_mut().for_each(|value| *value *= scale);
         }
+        require_finite("output sequence", &outputs)?;
         Ok(outputs)
     }
 
@@ -140,7 +141,8 @@ impl ResidualNetwork {
     /// One sample: the recurrence that [`Self::forward_sequence`] equals to rounding. Allocates nothing.
     ///
     /// # Errors
-    /// If a slice or the state does not fit this network, or the input is not finite; the state is then unchanged.
+    /// If a slice or the state does not fit this network, or the input is not finite: the state is then unchanged. If the
+    /// output overflows: the state is then of no more use.
     pub fn step(&self, state: &mut StreamState, input: &[f64], output: &mut [f64]) -> Result<(), Error> {
         require_length("input sample", self.config.inputs, input.len())?;
         require_length("output sample", self.config.outputs, output.len())?;
@@ -157,7 +159,7 @@ impl ResidualNetwork {
         for ((output, value), scale) in output.iter_mut().zip(result).zip(output_scale) {
             *output = value * scale;
         }
-        Ok(())
+        require_finite("output sample", output)
     }
 
     /// Loss on a set and its gradient by every weight, without dropout.

@@ -171,7 +171,7 @@ pub struct TrainingReport {
 /// The normalisation stays as it is.
 ///
 /// With a validation set, the weights kept are those with the lowest validation loss, the initial ones included;
-/// without, those after the last epoch. The same inputs give the same bits on the same build and machine.
+/// without, the last ones with a finite loss. The same inputs give the same bits on the same build and machine.
 /// `progress` is called after each epoch and may end the run.
 ///
 /// # Errors
@@ -192,7 +192,7 @@ pub fn train(
     let mut adam = Adam::new(weights.len());
 
     let initial_loss = held_out.as_mut().unwrap_or(&mut objective).loss(&weights)?;
-    let mut best_weights = weights.clone();
+    let mut kept = weights.clone();
     let mut report = TrainingReport {
         epochs: 0,
         best_epoch: 0,
@@ -204,14 +204,13 @@ pub fn train(
     };
     for epoch in 0..config.epochs_max {
         let training_loss = objective.loss_and_gradient(&weights, &mut gradient)?;
-        let norm = gradient.iter().map(|value| value * value).sum::<f64>().sqrt();
-        if !(training_loss.is_finite() && norm.is_finite()) {
+        if !clip(&mut gradient, config.gradient_norm_max) || !training_loss.is_finite() {
             report.stop_reason = StopReason::Diverged;
             break;
         }
-        if norm > config.gradient_norm_max {
-            let factor = config.gradient_norm_max / norm;
-            gradient.iter_mut().for_each(|value| *value *= factor);
+        if held_out.is_none() {
+            report.best_epoch = epoch;
+            kept.copy_from_slice(&weights);
         }
         adam.step(&blocks, config.rates(epoch), &mut weights, &gradient);
         report.epochs = epoch + 1;
@@ -224,30 +223,40 @@ pub fn train(
             if validation_loss < report.best_loss * (1.0 - config.improvement_min) {
                 report.best_loss = validation_loss;
                 report.best_epoch = report.epochs;
-                best_weights.copy_from_slice(&weights);
+                kept.copy_from_slice(&weights);
             }
-        } else {
-            best_weights.copy_from_slice(&weights);
-            report.best_epoch = report.epochs;
         }
         if progress(Progress { epoch: report.epochs, training_loss, validation_loss }).is_break() {
             report.stop_reason = StopReason::Interrupted;
             break;
         }
-        if report.epochs - report.best_epoch >= config.patience {
+        if held_out.is_some() && report.epochs - report.best_epoch >= config.patience {
             report.stop_reason = StopReason::EarlyStopping;
             break;
         }
     }
     if held_out.is_none() {
-        report.best_loss = objective.loss(&best_weights)?;
+        report.best_loss = objective.loss(&weights)?;
+        if report.best_loss.is_finite() {
+            report.best_epoch = report.epochs;
+            kept = weights;
+        } else {
+            report.stop_reason = StopReason::Diverged;
+            report.best_loss = objective.loss(&kept)?;
+        }
     }
-    let trained = ResidualNetwork::from_weights(
-        network.config().clone(),
-        network.normalization().clone(),
-        best_weights,
-    )?;
+    let trained =
+        ResidualNetwork::from_weights(network.config().clone(), network.normalization().clone(), kept)?;
     Ok((trained, report))
+}
+
+/// Shortens a gradient to at most `norm_max`; false if it is not finite.
+fn clip(gradient: &mut [f64], norm_max: f64) -> bool {
+    let norm = gradient.iter().map(|value| value * value).sum::<f64>().sqrt();
+    if norm > norm_max {
+        gradient.iter_mut().for_each(|value| *value *= norm_max / norm);
+    }
+    norm.is_finite()
 }
 
 /// Pipeline of a network's layers on a set, with its input normalised.

@@ -138,3 +138,19 @@ fn configurations_survive_json() {
     }
     assert_eq!(serde_json::to_string(&Architecture::Mlp).unwrap(), "\"mlp\"");
 }
+
+#[test]
+fn an_output_that_overflows_is_an_error() {
+    for architecture in ARCHITECTURES {
+        let network = network(architecture);
+        let huge = |_| f64::MAX;
+        let weights = network.weights().iter().map(huge).collect();
+        let network =
+            ResidualNetwork::from_weights(network.config().clone(), network.normalization().clone(), weights)
+                .unwrap();
+        let result = network.step(&mut network.stream_state(), &[1.0; 3], &mut [0.0; 2]);
+        assert!(matches!(result, Err(Error::NotFinite { what: "output sample", .. })), "{architecture:?}");
+        let result = network.forward_sequence(&[1.0; 9]);
+        assert!(matches!(result, Err(Error::NotFinite { what: "output sequence", .. })), "{architecture:?}");
+    }
+}

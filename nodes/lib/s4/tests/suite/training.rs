@@ -129,13 +129,17 @@ fn progress_is_reported_and_can_stop_the_run() {
 fn divergence_is_told_and_leaves_finite_weights() {
     let set = noise_set(1, (3, 2), &[60]);
     for architecture in ARCHITECTURES {
-        let settings = TrainingConfig {
-            learning_rate: 1e300,
-            state_space_learning_rate: 1e300,
-            ..TrainingConfig::default()
-        };
-        let (network, report) = run(small(architecture), (&set, Some(&set)), &settings);
-        assert_eq!(report.stop_reason, StopReason::Diverged, "{architecture:?}");
-        assert!(network.weights().iter().all(|weight| weight.is_finite()));
+        for (validation, epochs_max) in [(Some(&set), 300), (None, 300), (None, 1)] {
+            let settings = TrainingConfig {
+                learning_rate: 1e300,
+                state_space_learning_rate: 1e300,
+                epochs_max,
+                ..TrainingConfig::default()
+            };
+            let (network, report) = run(small(architecture), (&set, validation), &settings);
+            assert_eq!(report.stop_reason, StopReason::Diverged, "{architecture:?}");
+            assert!(network.weights().iter().all(|weight| weight.is_finite()));
+            assert!(network.evaluate(&set).unwrap().loss.is_finite());
+        }
     }
 }
