@@ -10,11 +10,11 @@ use crate::Message;
 pub struct Handshake {
     /// Names one run of the identification; unique per start of the sender.
     pub run_id: String,
-    /// The StateSequence that the message is about, counted from 1.
+    /// The StateSequence that the message is about: the stamp of its first sample in ns.
     pub sequence_id: u64,
     /// Turn of the outer loop, 0 = the start of the run.
     pub iteration: u32,
-    /// SHA-256 (hexadecimal) of the vehicle parameters in use.
+    /// Changes with any of the vehicle parameters in use (64 bits, hexadecimal).
     pub vehicle_hash: String,
     /// Seed of everything random in the run.
     pub seed: u64,
