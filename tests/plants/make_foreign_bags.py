@@ -140,6 +140,7 @@ class Slipx:
         d = self.seen
         return dict(
             f_y_front_n=d.fy_front, f_y_rear_n=d.fy_rear, f_z_front_n=d.fz_front, f_z_rear_n=d.fz_rear,
+            f_z_least_n=min(d.fz),
             steering_rad=self.state.steer, a_x_mps2=d.ax, a_y_mps2=d.ay,
         )
 
@@ -198,6 +199,7 @@ class Multibody:
         (fl, zfl), (fr, zfr), (rl, zrl), (rr, zrr) = seen
         return dict(
             f_y_front_n=fl + fr, f_y_rear_n=rl + rr, f_z_front_n=zfl + zfr, f_z_rear_n=zrl + zrr,
+            f_z_least_n=min(zfl, zfr, zrl, zrr),
             steering_rad=self.x[2], a_x_mps2=f[3] - self.x[10] * self.x[5], a_y_mps2=f[10] + self.x[3] * self.x[5],
         )
 

@@ -11,9 +11,6 @@ use crate::tire::TireParameters;
 /// Standard gravity.
 pub const GRAVITY_MPS2: f64 = 9.81;
 
-/// Load sensitivity of the tires' friction: its relative loss per relative growth of the load.
-pub(crate) const LOAD_SENSITIVITY: f64 = 0.5;
-
 /// Body roll on the springs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RollParameters {
@@ -80,6 +77,9 @@ pub struct CarParameters {
     pub tire_front: TireParameters,
     /// Rear tires.
     pub tire_rear: TireParameters,
+    /// Load sensitivity of the tires' friction: its relative loss per relative growth of the load, at the natural size of
+    /// `lateral_load_transfer`.
+    pub load_sensitivity: f64,
     /// Roll.
     pub roll: RollParameters,
     /// Pitch.
@@ -148,7 +148,7 @@ impl CarParameters {
     /// natural size of `lateral_load_transfer`.
     pub fn own_load_transfer_loss(&self, road_friction: f64) -> f64 {
         let limit = road_friction * (self.tire_front.grip + self.tire_rear.grip) / 2.0;
-        LOAD_SENSITIVITY * (2.0 * self.h_cg_m * limit / self.track_width_m).min(1.0).powi(2)
+        self.load_sensitivity * (2.0 * self.h_cg_m * limit / self.track_width_m).min(1.0).powi(2)
     }
 
     /// Speed below which slips are taken over this speed, so that standstill stays well posed.
@@ -161,7 +161,8 @@ impl CarParameters {
     /// # Errors
     /// `InvalidParameter` naming the first that is not.
     pub fn validate(&self) -> Result<(), ReferenceCarError> {
-        let positive: [(&str, f64); 22] = [
+        let positive: [(&str, f64); 23] = [
+            ("load_sensitivity", self.load_sensitivity),
             ("mass_kg", self.mass_kg),
             ("yaw_inertia_kgm2", self.yaw_inertia_kgm2),
             ("l_f_m", self.l_f_m),
@@ -245,6 +246,7 @@ fn f1tenth() -> CarParameters {
             grip: 1.0,
             sliding_share: 0.76,
         },
+        load_sensitivity: 0.4,
         roll: RollParameters {
             gradient_rad_per_g: 0.05,
             frequency_hz: 4.5,
@@ -292,6 +294,7 @@ fn formula_student() -> CarParameters {
             grip: 1.03,
             sliding_share: 0.72,
         },
+        load_sensitivity: 0.35,
         roll: RollParameters {
             gradient_rad_per_g: 0.02,
             frequency_hz: 3.5,
@@ -339,6 +342,7 @@ fn race_car() -> CarParameters {
             grip: 1.04,
             sliding_share: 0.70,
         },
+        load_sensitivity: 0.35,
         roll: RollParameters {
             gradient_rad_per_g: 0.008,
             frequency_hz: 4.0,
@@ -386,6 +390,7 @@ fn passenger_car() -> CarParameters {
             grip: 1.0,
             sliding_share: 0.76,
         },
+        load_sensitivity: 0.3,
         roll: RollParameters {
             gradient_rad_per_g: 0.08,
             frequency_hz: 1.6,

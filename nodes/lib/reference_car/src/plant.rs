@@ -15,7 +15,7 @@
 //! One step is the explicit midpoint rule; wheel spin takes a linearly implicit half step and relaxation an exponential
 //! one, so that both stay stable at any speed.
 
-use crate::car::{CarParameters, GRAVITY_MPS2, LOAD_SENSITIVITY};
+use crate::car::{CarParameters, GRAVITY_MPS2};
 use crate::effects::Mechanisms;
 use crate::tire::{Contact, Tire, TireForce};
 
@@ -444,9 +444,9 @@ fn scale_tire(tire: &mut crate::tire::TireParameters, factor: f64) {
 /// sensitivity.
 ///
 /// An axle whose loads differ by the share x of its load loses `e x^2` of its grip. At its own size the car shifts what
-/// its centre of gravity says and its tires have [`LOAD_SENSITIVITY`]; for another loss k at the limit both are scaled by
+/// its centre of gravity says and its tires have their own sensitivity; for another loss k at the limit both are scaled by
 /// the cube root of the ratio, so that the effect vanishes smoothly.
 fn load_transfer(car: &CarParameters, mechanisms: &Mechanisms, road_friction: f64) -> (f64, f64) {
     let size = (mechanisms.load_transfer_loss / car.own_load_transfer_loss(road_friction)).cbrt();
-    (size, LOAD_SENSITIVITY * size)
+    (size, car.load_sensitivity * size)
 }
