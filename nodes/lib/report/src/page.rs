@@ -121,6 +121,15 @@ pub(crate) fn table<const N: usize>(head: [&str; N], rows: &[[String; N]]) -> Ma
     }
 }
 
+/// Names and what is to be said of them.
+pub(crate) fn facts_table(facts: &[(&str, String)]) -> Markup {
+    html! {
+        table.facts-table {
+            tbody { @for (name, value) in facts { tr { td { (name) } td { (value) } } } }
+        }
+    }
+}
+
 /// Sentences one below the other; `none` where there is nothing to say.
 pub(crate) fn list(items: &[String], none: &str) -> Markup {
     html! {

@@ -6,20 +6,12 @@ const NOTHING: &str = "–";
 /// A number with so many significant digits, without an exponent; a dash where it is not finite.
 #[must_use]
 pub fn significant(value: f64, digits: usize) -> String {
-    if !value.is_finite() {
-        return NOTHING.into();
-    }
-    let text = format!("{value:.*}", decimals(value.abs(), digits));
-    minus(if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') {
-        text.trim_start_matches('-').into()
-    } else {
-        text
-    })
+    fixed(value, decimals(value.abs(), digits))
 }
 
 /// Decimals that show a magnitude with so many significant digits.
 fn decimals(magnitude: f64, digits: usize) -> usize {
-    if magnitude < 1e-9 {
+    if !(magnitude.is_finite() && magnitude >= 1e-9) {
         return digits.saturating_sub(1);
     }
     (digits as i32 - 1 - magnitude.log10().floor() as i32).clamp(0, 9) as usize
@@ -28,7 +20,17 @@ fn decimals(magnitude: f64, digits: usize) -> usize {
 /// With a fixed number of decimals; a dash where it is not finite.
 #[must_use]
 pub fn fixed(value: f64, decimals: usize) -> String {
-    if value.is_finite() { minus(format!("{value:.decimals$}")) } else { NOTHING.into() }
+    if !value.is_finite() {
+        return NOTHING.into();
+    }
+    let text = format!("{value:.decimals$}");
+    let unsigned = text.trim_start_matches('-');
+    // A true minus sign is as wide as a figure; a zero has none.
+    if unsigned.len() == text.len() || unsigned.chars().all(|c| c == '0' || c == '.') {
+        unsigned.to_owned()
+    } else {
+        format!("−{unsigned}")
+    }
 }
 
 /// "low … high", with the decimals that the interval's width deserves; a dash where an end is not finite.
@@ -37,28 +39,29 @@ pub fn interval(low: f64, high: f64) -> String {
     if !(low.is_finite() && high.is_finite()) {
         return NOTHING.into();
     }
-    let decimals = decimals((high - low).abs(), 2);
+    let decimals = interval_decimals(low, high);
     format!("{} … {}", fixed(low, decimals), fixed(high, decimals))
 }
 
-/// A value with the decimals of its interval.
+/// A value with the decimals of its interval, and the interval.
 #[must_use]
 pub fn with_interval(value: f64, low: f64, high: f64) -> (String, String) {
     if !(low.is_finite() && high.is_finite()) {
         return (significant(value, 3), NOTHING.into());
     }
-    (fixed(value, decimals((high - low).abs(), 2)), interval(low, high))
+    (fixed(value, interval_decimals(low, high)), interval(low, high))
+}
+
+/// Two digits of the interval's width, but no more than four of the numbers.
+fn interval_decimals(low: f64, high: f64) -> usize {
+    let (width, size) = ((high - low).abs(), low.abs().max(high.abs()));
+    if width <= 1e-9 * size { decimals(size, 3) } else { decimals(width, 2).min(decimals(size, 4)) }
 }
 
 /// A share as percent.
 #[must_use]
 pub fn percent(share: f64) -> String {
     if share.is_finite() { format!("{} %", fixed(100.0 * share, 0)) } else { NOTHING.into() }
-}
-
-/// A true minus sign is as wide as a figure.
-fn minus(text: String) -> String {
-    text.replace('-', "−")
 }
 
 #[cfg(test)]
@@ -81,6 +84,8 @@ mod tests {
         assert_eq!(with_interval(0.080_123, 0.079, 0.081_4), ("0.0801".into(), "0.0790 … 0.0814".into()));
         assert_eq!(with_interval(61.23, 50.0, 70.0), ("61".into(), "50 … 70".into()));
         assert_eq!(with_interval(61.23, f64::NAN, 70.0), ("61.2".into(), "–".into()));
-        assert_eq!(interval(1.0, 1.0), "1.0 … 1.0");
+        assert_eq!(with_interval(2.384_08, 2.383_8, 2.384_35).0, "2.384");
+        assert_eq!(interval(-0.000_4, 0.3), "0.00 … 0.30");
+        assert_eq!(interval(1.0, 1.0), "1.00 … 1.00");
     }
 }

@@ -13,10 +13,10 @@ type Context<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf
 type Outcome = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 
 /// Room for the numbers and names of the axes, and around the frame, in units of the page.
-const BELOW: f64 = 36.0;
-const LEFT: f64 = 50.0;
+const BELOW: f64 = 40.0;
+const LEFT: f64 = 54.0;
 const AROUND: f64 = 8.0;
-const TEXT: f64 = 11.0;
+const TEXT: f64 = 14.0;
 const LINE: f64 = 1.6;
 /// Share of the frame's height that the strip of visits takes at most.
 const STRIP: f64 = 0.13;
@@ -191,11 +191,13 @@ fn strip(context: &mut Context<'_, '_>, frame: &Frame, bins: &[(f64, f64, f64)])
         return Ok(());
     }
     let height = STRIP * (frame.y.1 - frame.y.0);
-    for &(from, to, count) in bins.iter().filter(|b| b.2 > 0.0) {
-        // The root shows rare visits too.
-        let top = frame.y.0 + height * (count / most).sqrt();
-        let corners = [(frame.clamp_x(from), frame.y.0), (frame.clamp_x(to), top)];
-        context.plotting_area().draw(&Rectangle::new(corners, DENSITY.filled()))?;
+    // One outline instead of a box for each: no gaps where boxes meet. The root shows rare visits too.
+    let top = |count: f64| frame.y.0 + height * (count.max(0.0) / most).sqrt();
+    let steps = bins.iter().flat_map(|&(from, to, count)| [(from, top(count)), (to, top(count))]);
+    let mut outline: Vec<(f64, f64)> = steps.map(|(x, y)| (frame.clamp_x(x), y)).collect();
+    if let (Some(first), Some(last)) = (outline.first().copied(), outline.last().copied()) {
+        outline.extend([(last.0, frame.y.0), (first.0, frame.y.0)]);
+        context.plotting_area().draw(&Polygon::new(outline, DENSITY))?;
     }
     Ok(())
 }

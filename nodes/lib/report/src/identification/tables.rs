@@ -3,7 +3,7 @@
 use gripsight_identification::{Estimate, Outcome, PeakFriction, Range};
 use maud::{Markup, html};
 
-use crate::page::{list, table};
+use crate::page::{facts_table, list, table};
 use crate::text::{fixed, interval, percent, significant, with_interval};
 
 /// Parameters, stiffness, grip and slip visited.
@@ -58,10 +58,7 @@ pub(super) fn signals(outcome: &Outcome) -> Markup {
     .map(|(title, name, e)| {
         let (value, interval) = with_interval(e.value, e.low, e.high);
         let weak = outcome.weak_signals.iter().find(|w| w.name == name);
-        let rests = weak.map_or_else(
-            || "data".to_owned(),
-            |w| format!("data {}, assumption {}", percent(w.data_share), percent(1.0 - w.data_share)),
-        );
+        let rests = weak.map_or_else(|| "data".to_owned(), |w| format!("data {}", percent(w.data_share)));
         [title.to_owned(), value, interval, rests]
     });
     table(["", "Value", "90 %", "Rests on"], &rows)
@@ -109,15 +106,32 @@ pub(super) fn health(outcome: &Outcome, notes: &[String]) -> Markup {
     };
     let recorded = if h.recorded.is_empty() { "nothing".to_owned() } else { h.recorded.join(", ") };
     let speeds = &outcome.v_x_range_mps;
+    let facts = [
+        (
+            "Samples",
+            format!(
+                "{} at {} Hz, jitter {} ms",
+                h.samples,
+                significant(h.rate_hz, 3),
+                significant(1000.0 * h.jitter_s, 2)
+            ),
+        ),
+        ("Duration", format!("{} s, moving {}", fixed(h.duration_s, 1), percent(h.moving_share))),
+        (
+            "Speed",
+            format!(
+                "{} … {} m/s, mean {} m/s",
+                fixed(speeds.low, 1),
+                fixed(speeds.high, 1),
+                fixed(outcome.mean_speed_mps, 1)
+            ),
+        ),
+        ("Pauses", gaps),
+        ("Frozen", frozen),
+        ("Also recorded", recorded),
+    ];
     html! {
-        (table(["", ""], &[
-            ["Samples".into(), format!("{} at {} Hz, jitter {} ms", h.samples, significant(h.rate_hz, 3), significant(1000.0 * h.jitter_s, 2))],
-            ["Duration".into(), format!("{} s, moving {}", fixed(h.duration_s, 1), percent(h.moving_share))],
-            ["Speed".into(), format!("{} … {} m/s, mean {} m/s", fixed(speeds.low, 1), fixed(speeds.high, 1), fixed(outcome.mean_speed_mps, 1))],
-            ["Pauses".into(), gaps],
-            ["Frozen channels".into(), frozen],
-            ["Recorded beside the needed".into(), recorded],
-        ]))
+        (facts_table(&facts))
         @if !notes.is_empty() { (list(notes, "")) }
     }
 }

@@ -1,0 +1,241 @@
+//! The contract that scripts depend on: help, exit codes, files, errors.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+use serde_json::Value;
+
+fn gripsight(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_gripsight"))
+        .args(arguments)
+        .env("COLUMNS", "100")
+        .env_remove("RUST_LOG")
+        .output()
+        .unwrap()
+}
+
+fn code(output: &Output) -> i32 {
+    output.status.code().unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+/// The error alone: what stands between `error: ` and the end, without the log.
+fn error_of(arguments: &[&str]) -> String {
+    let output = gripsight(arguments);
+    let text = stderr(&output);
+    assert_eq!(code(&output), 1, "{text}");
+    assert!(output.stdout.is_empty());
+    assert!(!text.contains("panicked"), "{text}");
+    text[text.find("error: ").unwrap()..].to_owned()
+}
+
+/// A folder with a short simulated drive.
+struct Drive {
+    folder: tempfile::TempDir,
+}
+
+impl Drive {
+    fn shared() -> &'static Self {
+        static DRIVE: OnceLock<Drive> = OnceLock::new();
+        DRIVE.get_or_init(|| {
+            let folder = tempfile::tempdir().unwrap();
+            let bag = folder.path().join("laps.mcap");
+            let output = gripsight(&["simulate", "--duration", "12", "--out", bag.to_str().unwrap()]);
+            assert_eq!(code(&output), 0, "{}", stderr(&output));
+            Self { folder }
+        })
+    }
+
+    fn file(&self, name: &str) -> String {
+        self.folder.path().join(name).to_str().unwrap().to_owned()
+    }
+
+    /// Identifies from the drive into a folder of the given name.
+    fn identify(&self, out: &str, more: &[&str]) -> (Output, PathBuf) {
+        let folder = self.folder.path().join(out);
+        let (bag, vehicle) = (self.file("laps.mcap"), self.file("laps.vehicle.yaml"));
+        let mut arguments = vec!["identify", &bag, "--vehicle", &vehicle, "--out", folder.to_str().unwrap()];
+        arguments.extend(more);
+        (gripsight(&arguments), folder)
+    }
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
+}
+
+#[test]
+fn help_says_what_each_command_does() {
+    for command in ["identify", "friction"] {
+        let output = gripsight(&[command, "--help"]);
+        assert_eq!(code(&output), 0);
+        insta::assert_snapshot!(format!("help_{command}"), String::from_utf8(output.stdout).unwrap());
+    }
+    assert_eq!(code(&gripsight(&["--version"])), 0);
+}
+
+#[test]
+fn wrong_usage_exits_with_2() {
+    for arguments in [
+        &[] as &[&str],
+        &["identify"],
+        &["identify", "a.mcap"],
+        &["identify", "a.mcap", "--out", "x", "--prior-mu", "-1"],
+        &["identify", "a.mcap", "--out", "x", "--prior-mu", "nan"],
+        &["identify", "a.mcap", "--out", "x", "--prior-mu", "1", "--camera"],
+        &["identify", "a.mcap", "--out", "x", "--method", "magic"],
+        &["identify", "a.mcap", "--out", "x", "--seed", "-1"],
+        &["friction"],
+        &["frobnicate"],
+    ] {
+        let output = gripsight(arguments);
+        assert_eq!(code(&output), 2, "{arguments:?}: {}", stderr(&output));
+    }
+}
+
+#[test]
+fn every_file_is_written_and_the_exit_code_says_whether_to_use_them() {
+    for (out, more) in [("plain", &["--residual", "none"] as &[&str]), ("prior", &["--prior-mu", "0.9"])] {
+        let (output, folder) = Drive::shared().identify(out, more);
+        let result = json(&folder.join("identification.json"));
+        let accepted = result["accepted"].as_bool().unwrap();
+        assert_eq!(code(&output), if accepted { 0 } else { 3 }, "{}", stderr(&output));
+        let tire_files = if accepted {
+            ["pacejka.yaml", "f1tenth_pacejka.txt", "f1tenth_lookup_table.csv"]
+        } else {
+            ["pacejka.rejected.yaml", "f1tenth_pacejka.rejected.txt", "f1tenth_lookup_table.rejected.csv"]
+        };
+        let mut expected = vec!["identification.json", "report.html", "timing.json"];
+        expected.extend(tire_files);
+        expected.sort_unstable();
+        let mut found: Vec<_> =
+            fs::read_dir(&folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        found.sort_unstable();
+        assert_eq!(found, expected);
+        for axle in ["front", "rear"] {
+            for letter in ["b", "c", "d", "e"] {
+                assert!(result["phi_p"][axle][letter].is_f64(), "{axle} {letter}");
+            }
+            for end in ["value", "low", "high"] {
+                assert!(result["cornering_stiffness_n_per_rad"][axle].get(end).is_some());
+                assert!(result["peak_friction"][axle].get(end).is_some());
+            }
+            assert!(result["peak_friction"][axle]["reached"].is_boolean());
+            assert!(result["peak_friction"][axle]["from_prior"].is_boolean());
+            assert!(result["slip_range_rad"][axle]["high"].is_f64());
+        }
+        for name in ["steering_delay_s", "v_y_lever_arm_m", "steering_gain", "v_y_bias_mps"] {
+            assert!(result["signals"][name].is_f64(), "{name}");
+        }
+        for (kind, when) in
+            [("one_step", "before"), ("one_step", "after"), ("rollout", "before"), ("rollout", "after")]
+        {
+            assert!(result["rmse"][kind][when].is_f64(), "{kind} {when}");
+        }
+        assert!(
+            result["iterations"].is_u64() && result["converged"].is_boolean() && result["reasons"].is_array()
+        );
+        let timing = json(&folder.join("timing.json"));
+        let parts: f64 = timing.as_object().unwrap().values().map(|v| v.as_f64().unwrap()).sum();
+        let total = timing["total_s"].as_f64().unwrap();
+        assert!(parts - total <= total && parts - total > 0.9 * total, "{timing}");
+        let stdout = String::from_utf8(output.stdout).unwrap();
+        assert!(stdout.starts_with(if accepted { "f1tenth: accepted" } else { "f1tenth: not accepted" }));
+        assert!(stdout.lines().count() < 40);
+    }
+}
+
+#[test]
+fn the_same_bag_gives_the_same_bytes() {
+    let (_, first) = Drive::shared().identify("once", &["--seed", "3"]);
+    let (_, second) = Drive::shared().identify("again", &["--seed", "3"]);
+    let mut compared = 0;
+    for entry in fs::read_dir(&first).unwrap() {
+        let name = entry.unwrap().file_name();
+        if name != "timing.json" {
+            assert!(
+                fs::read(first.join(&name)).unwrap() == fs::read(second.join(&name)).unwrap(),
+                "{name:?}"
+            );
+            compared += 1;
+        }
+    }
+    assert_eq!(compared, 5);
+}
+
+#[test]
+fn the_truth_is_drawn_where_it_is_given() {
+    let truth = Drive::shared().file("laps.truth.csv");
+    let (_, folder) = Drive::shared().identify("truth", &["--residual", "none", "--truth", &truth]);
+    assert!(fs::read_to_string(folder.join("report.html")).unwrap().contains("truth</span>"));
+    let wrong = Drive::shared().file("laps.vehicle.yaml");
+    let (output, _) = Drive::shared().identify("wrong_truth", &["--residual", "none", "--truth", &wrong]);
+    assert!(stderr(&output).contains("cannot use the truth"));
+}
+
+#[test]
+fn a_run_starts_from_an_accepted_one_of_the_same_car_only() {
+    let (output, first) = Drive::shared().identify("earlier", &["--prior-mu", "0.9"]);
+    let file = first.join("identification.json");
+    let more = ["--residual", "none", "--previous", file.to_str().unwrap()];
+    let (later, _) = Drive::shared().identify("later", &more);
+    match code(&output) {
+        0 => assert!([0, 3].contains(&code(&later)), "{}", stderr(&later)),
+        _ => assert!(stderr(&later).contains("not accepted"), "{}", stderr(&later)),
+    }
+    let text = fs::read_to_string(&file).unwrap().replace("\"vehicle_hash\": \"", "\"vehicle_hash\": \"f00");
+    let other = Drive::shared().file("other_car.json");
+    fs::write(&other, text).unwrap();
+    let (refused, _) = Drive::shared().identify("refused", &["--previous", &other]);
+    assert_eq!(code(&refused), 1, "{}", stderr(&refused));
+}
+
+#[test]
+fn hostile_inputs_are_named_in_one_line_each() {
+    let drive = Drive::shared();
+    let folder = drive.folder.path();
+    let (bag, out) = (drive.file("laps.mcap"), drive.file("hostile"));
+    let write = |name: &str, bytes: &[u8]| {
+        fs::write(folder.join(name), bytes).unwrap();
+        drive.file(name)
+    };
+    let empty = folder.join("empty_folder");
+    fs::create_dir_all(&empty).unwrap();
+    let identify = |bag: &str, more: &[&str]| {
+        let mut arguments = vec!["identify", bag, "--out", &out];
+        arguments.extend(more);
+        error_of(&arguments)
+    };
+    let missing = identify("/nowhere/laps.mcap", &[]);
+    assert!(missing.contains("/nowhere/laps.mcap"), "{missing}");
+    let folder_error = identify(empty.to_str().unwrap(), &[]);
+    assert!(folder_error.contains("empty_folder"), "{folder_error}");
+    for (name, bytes) in
+        [("text.mcap", b"hello, world" as &[u8]), ("nothing.mcap", b""), ("magic.mcap", b"\x89MCAP0\r\n")]
+    {
+        let error = identify(&write(name, bytes), &[]);
+        assert!(error.contains(name), "{error}");
+        assert!(error.lines().count() <= 3, "{error}");
+    }
+    let bad_yaml = write("bad.yaml", b"][");
+    let error = identify(&bag, &["--vehicle", &bad_yaml]);
+    assert!(error.contains("bad.yaml"), "{error}");
+    let no_mass = write("no_mass.yaml", b"/**:\n  ros__parameters:\n    vehicle:\n      l_f_m: 0.1\n");
+    assert!(identify(&bag, &["--vehicle", &no_mass]).contains("mass_kg"));
+    assert!(identify(&bag, &["--vehicle", "/nowhere.yaml"]).contains("/nowhere.yaml"));
+    let topics = write("topics.yaml", b"odom: /not/there\n");
+    let error = identify(&bag, &["--topics", &topics]);
+    assert!(error.contains("/not/there"), "{error}");
+    assert!(identify(&bag, &["--previous", &bad_yaml]).contains("bad.yaml"));
+    assert!(identify(&bag, &["--sequence", "12"]).contains("no state sequence 12"));
+    assert!(identify(&bag, &["--camera"]).contains("no topic with pictures"));
+    let not_a_folder = write("file", b"");
+    let error = error_of(&["identify", &bag, "--out", &format!("{not_a_folder}/x")]);
+    assert!(error.contains("cannot make"), "{error}");
+    assert!(error_of(&["friction", "/nowhere.png"]).contains("/nowhere.png"));
+}
