@@ -101,27 +101,32 @@ impl Simulation {
     /// recording holds everything up to that moment.
     pub fn run(mut self, mut progress: impl FnMut(f64)) -> Recording {
         let total = (self.scenario.duration_s / self.scenario.step_s).round() as u64;
-        let period = ((1.0 / (self.scenario.driver.rate_hz * self.scenario.step_s)).round() as u64).max(1);
         let mut end = EndReason::Completed;
         while self.steps <= total {
             if self.steps % (total / 100).max(1) == 0 {
                 progress(self.steps as f64 / total as f64);
             }
-            if self.steps >= self.next_command {
-                self.next_command = self.steps + period;
-                let command = self.driver.command(&self.view(), self.track.as_ref());
-                self.command(command);
-            }
-            if let Err(reason) = self.step() {
-                end = reason;
-                break;
-            }
-            if let Some(reason) = self.trouble() {
+            if let Err(reason) = self.drive() {
                 end = reason;
                 break;
             }
         }
         Recording { samples: self.drain(), truth: self.truth, end }
+    }
+
+    /// One step with the scenario's own driver.
+    ///
+    /// # Errors
+    /// The reason for which a run cannot go on.
+    pub fn drive(&mut self) -> Result<(), EndReason> {
+        if self.steps >= self.next_command {
+            let rate_per_step = self.scenario.driver.rate_hz * self.scenario.step_s;
+            self.next_command = self.steps + ((1.0 / rate_per_step).round() as u64).max(1);
+            let command = self.driver.command(&self.view(), self.track.as_ref());
+            self.command(command);
+        }
+        self.step()?;
+        self.trouble().map_or(Ok(()), Err)
     }
 
     /// Time since the start of the run.
@@ -169,6 +174,17 @@ impl Simulation {
             acceleration_mps2: self.acceleration(),
         };
         self.samples.extend(self.sensors.drive(sample));
+    }
+
+    /// The command in force.
+    pub fn commanded(&self) -> Command {
+        self.command
+    }
+
+    /// Puts this car where another one is, moving as that one does; actuators and sensors stay as they are.
+    pub fn follow(&mut self, other: &Self) {
+        self.state = other.state;
+        self.place = other.place;
     }
 
     /// Takes what the sensors reported since the last call, by stamp.
