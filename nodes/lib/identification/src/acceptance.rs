@@ -6,6 +6,9 @@ use crate::{Identification, Outcome, PeakFriction};
 /// A new set may predict held-out data this much worse than the previous one and still replace it: both are within noise.
 const NO_WORSE: f64 = 1.02;
 
+/// Largest scatter of v_y, as a share of the rear slips visited, that tires can be fitted through.
+const V_Y_SHARE: f64 = 0.35;
+
 /// Fills in verdict, reasons and advice.
 pub(crate) fn judge(run: &Identification, outcome: &mut Outcome) {
     let mut against = Vec::new();
@@ -14,8 +17,32 @@ pub(crate) fn judge(run: &Identification, outcome: &mut Outcome) {
     if !outcome.phi_p.is_finite() {
         against.push("the tires are not finite".to_owned());
     }
-    if !outcome.on_bound.is_empty() {
-        against.push(format!("on a bound: {}", outcome.on_bound.join(", ")));
+    // C and E share a flat ridge: one of them on its bound still is the curve that the data show. B and D are not.
+    let (shape, railed): (Vec<_>, Vec<_>) =
+        outcome.on_bound.iter().cloned().partition(|name| name.ends_with(".c") || name.ends_with(".e"));
+    if !railed.is_empty() {
+        against.push(format!("on a bound: {}", railed.join(", ")));
+    }
+    if !shape.is_empty() {
+        remarks.push(format!("on a bound, within a shape that the data hardly tell: {}", shape.join(", ")));
+    }
+    // What the scatter of v_y makes of the rear slip at the mean speed.
+    let slip = &outcome.slip_range_rad.rear;
+    let visited_rad = slip.low.abs().max(slip.high.abs());
+    let scatter_mps = outcome.rmse.noise[0];
+    let scatter_rad = scatter_mps / outcome.mean_speed_mps;
+    if scatter_rad > V_Y_SHARE * visited_rad {
+        against.push(format!(
+            "v_y scatters by {scatter_mps:.3} m/s about any model: {:.1} degrees of slip where the rear slip stayed within {:.1} degrees (at most {:.0} % \
+             of it can be used); it cannot support the rear tires",
+            scatter_rad.to_degrees(),
+            visited_rad.to_degrees(),
+            100.0 * V_Y_SHARE
+        ));
+        drive.push(
+            "feed a v_y that is measured: motion capture, two antennas, an optical sensor, or an estimator with side slip"
+                .to_owned(),
+        );
     }
     let rollout = &outcome.rmse.rollout;
     let (limit, than) = match run.previous {

@@ -9,7 +9,7 @@ use gripsight_vehicle::{
 use crate::data::Part;
 use crate::judge::{best_starts, errors_over_horizon, one_step_errors, rollout_errors};
 use crate::picture::{curves, trace};
-use crate::rollout::{NAMES, SIGNALS, TireRollout, vector_of};
+use crate::rollout::{NAMES, PARAMETERS, SIGNALS, TireRollout, vector_of};
 use crate::tires::on_bound;
 use crate::{
     Change, Config, Estimate, FrictionPrior, HorizonError, Identification, Outcome, PeakFriction, PerAxle,
@@ -64,6 +64,7 @@ pub(crate) fn refused(
         signals: SignalCorrections::NONE,
         signal_intervals: SignalEstimates::from_array([unknown; 6]),
         weak_signals: Vec::new(),
+        relaxation_m: f64::NAN,
         rmse: RmseReport { one_step: rmse, rollout: rmse, horizon_s: f64::NAN, noise: [f64::NAN; 2] },
         rollout_error: Vec::new(),
         source: Source::Start,
@@ -86,15 +87,15 @@ pub(crate) fn refused(
 pub(crate) fn conclude(run: &Identification, converged: bool) -> Outcome {
     let (phi_p, source) = choose(run);
     let corrections = run.direct.corrections;
-    let rollout = TireRollout { vehicle: &run.vehicle, segments: &run.data.segments };
+    let rollout = TireRollout::new(&run.vehicle, &run.data);
     let test = run.data.part(Part::Test);
-    let noise = run.direct.sigma;
-    let after = vector_of(&phi_p, &corrections);
+    let noise = run.direct.scatter;
+    let after = vector_of(&phi_p, &corrections, run.direct.relaxation_m);
     let before_corrections = run.previous.as_ref().map_or(SignalCorrections::NONE, |p| p.corrections);
-    let before = vector_of(&run.initial, &before_corrections);
+    let before = vector_of(&run.initial, &before_corrections, run.direct.relaxation_m);
     let rmse = |errors: fn(
         &TireRollout<'_>,
-        &[f64; 14],
+        &[f64; PARAMETERS],
         &[crate::shooting::Window],
         &[f64; 2],
     ) -> crate::judge::Errors| {
@@ -105,7 +106,7 @@ pub(crate) fn conclude(run: &Identification, converged: bool) -> Outcome {
     let window_len = test.first().map_or(0, |w| w.len);
     let starts = best_starts(&rollout, &after, &test, &noise);
     let len = (HORIZON_S / run.data.dt_s).round() as usize;
-    let over = |p: &[f64; 14]| errors_over_horizon(&rollout, &run.data, p, &test, &starts, len);
+    let over = |p: &[f64; PARAMETERS]| errors_over_horizon(&rollout, &run.data, p, &test, &starts, len);
     let rollout_error = over(&before)
         .into_iter()
         .zip(over(&after))
@@ -128,6 +129,7 @@ pub(crate) fn conclude(run: &Identification, converged: bool) -> Outcome {
         signals: corrections,
         signal_intervals: signal_intervals(run),
         weak_signals: weak_signals(run),
+        relaxation_m: run.direct.relaxation_m,
         rmse: RmseReport {
             one_step: rmse(one_step_errors),
             rollout: rmse(rollout_errors),
@@ -224,6 +226,9 @@ fn weak_signals(run: &Identification) -> Vec<WeakSignal> {
         .filter_map(|j| {
             let prior_sigma = run.direct.signal_priors[j].sigma;
             let error = run.direct.signal_errors[j].unwrap_or(prior_sigma);
+            if j == 5 && run.data.has_heading() {
+                return None;
+            }
             let data_share = 1.0 - (error / prior_sigma).powi(2).min(1.0);
             (data_share < WEAK_SHARE).then_some(WeakSignal {
                 name: NAMES[SIGNALS + j],

@@ -100,12 +100,12 @@ impl Default for Config {
             residual: ResidualKind::S4,
             seed: 0,
             initial: PacejkaParameters { front: axle, rear: axle },
-            max_iterations: 8,
+            max_iterations: 6,
             tolerance: 0.02,
             d_model: 16,
             d_state: 16,
             layers: 1,
-            epochs: 80,
+            epochs: 60,
             direct_start: true,
         }
     }

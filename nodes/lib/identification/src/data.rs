@@ -28,6 +28,8 @@ pub(crate) struct Data {
     /// Windows that tile the stretches, and the part of each.
     pub(crate) windows: Vec<(Window, Part)>,
     pub(crate) mean_speed_mps: f64,
+    /// Forward acceleration of the centre of gravity at every sample of every segment, smoothed, m/s2.
+    pub(crate) a_x_mps2: Vec<Vec<f64>>,
     /// Noise of v_y and yaw rate, from what neither car nor tire does that fast.
     pub(crate) noise: [f64; 2],
 }
@@ -45,6 +47,8 @@ const PATTERN: [Part; 6] =
 const SLOW_SHARE: f64 = 0.25;
 /// Slowest speed that counts in any case.
 const SLOW_MPS: f64 = 0.5;
+/// Half the length of the lines that give the derivative of v_x.
+const SLOPE_HALF_S: f64 = 0.1;
 /// Fewest windows to fit anything to.
 const MIN_WINDOWS: usize = 12;
 
@@ -96,8 +100,24 @@ impl Data {
         let driven =
             || windows.iter().flat_map(|(w, _)| &segments[w.segment].v_x_mps[w.from..w.from + w.len]);
         let mean_speed_mps = driven().sum::<f64>() / driven().count() as f64;
+        let a_x_mps2 = segments.iter().map(forward_acceleration).collect();
         let noise = [noise_of(&segments, |s| &s.v_y_mps), noise_of(&segments, |s| &s.yaw_rate_radps)];
-        Ok(Self { health: health.clone(), segments, dt_s, stretches, windows, mean_speed_mps, noise })
+        Ok(Self {
+            health: health.clone(),
+            segments,
+            dt_s,
+            stretches,
+            windows,
+            mean_speed_mps,
+            a_x_mps2,
+            v_y_explained,
+            noise,
+        })
+    }
+
+    /// Whether there is a heading, which tells the yaw rate's bias.
+    pub(crate) fn has_heading(&self) -> bool {
+        self.segments.iter().all(|s| !s.yaw_rad.is_empty())
     }
 
     /// Windows of one part.
@@ -133,6 +153,25 @@ fn moving_stretches(segments: &[Segment], slow_mps: f64, min_len: usize) -> Vec<
         }
     }
     stretches
+}
+
+/// dv_x/dt - v_y w, the derivative as the slope of a line through a fifth of a second.
+fn forward_acceleration(s: &Segment) -> Vec<f64> {
+    let half = (SLOPE_HALF_S / s.dt_s).round().max(1.0) as usize;
+    (0..s.len())
+        .map(|k| {
+            let half = half.min(k).min(s.len() - 1 - k).max(1);
+            let (from, to) = (k.saturating_sub(half), (k + half).min(s.len() - 1));
+            let middle = 0.5 * (from + to) as f64;
+            let (mut up, mut down) = (0.0, 0.0);
+            for i in from..=to {
+                let t = i as f64 - middle;
+                up += t * s.v_x_mps[i];
+                down += t * t;
+            }
+            up / (down * s.dt_s) - s.v_y_mps[k] * s.yaw_rate_radps[k]
+        })
+        .collect()
 }
 
 /// Standard deviation of white noise on a channel, from its third differences (robust: by their median).

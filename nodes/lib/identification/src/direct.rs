@@ -1,44 +1,53 @@
 //! The direct fit: signal corrections and tires together, by shooting. It is the start of the robust method, the baseline that the
 //! residual loop has to beat, and the source of all intervals.
 //!
-//! 1. Signals and stiffnesses on the windows of low lateral acceleration, from several steering delays: what the tires do at the limit, which
-//!    no simple model gets right, stays out of delay, gain, lever arm and bias.
-//! 2. All parameters on all windows, the signals held softly at what step 1 found.
-//! 3. An axle whose peak the data do not reach gets its D from the friction prior (else it stays at what is likely), and step 2 is repeated.
+//! 1. Delay, offsets and stiffnesses on the windows of low lateral acceleration, from several steering delays: what the tires do at the limit,
+//!    which no simple model gets right, stays out of them.
+//! 2. All parameters on all windows. Gain and lever arm are freed only where the validation part says that it is worth it: at nearly one speed
+//!    they are the stiffnesses in disguise.
+//! 3. An axle whose peak the data do not reach gets its D from the friction prior, and step 2 is repeated with it.
+//!
+//! Which is identifiable from what: the yaw rate's bias from the heading alone (fixed then); delay from transients; offset and bias of v_y from driving
+//! straight; gain (against K_f) and lever arm (against K_r) from a range of speeds, and from nothing else. Every one has a prior, [`SIGNAL_PRIORS`].
+
+use nalgebra::{DMatrix, DVector};
 
 use gripsight_vehicle::{GRAVITY_MPS2, MagicFormula, PacejkaParameters, SingleTrack, VehicleParameters};
 
 use crate::data::{Data, Part, median, quantile};
-use crate::rollout::{PARAMETERS, SIGNALS, TireRollout, corrections_of, tires_of};
+use crate::judge::rollout_errors;
+use crate::rollout::{RELAXATION, SIGNALS, TireRollout, corrections_of, tires_of};
 use crate::shooting::{Fit, Parameter, Prior, Problem, Rollout, StopReason, Window, fit};
-use crate::tires::parameters;
+use crate::tires::{C_PRIOR, E_PRIOR, parameters};
 use crate::{FrictionPrior, IdentificationError, PerAxle, Range, SignalCorrections};
 
 /// What is likely of the signals before the data are looked at: (mean, sigma, low, high) in the order of [`SignalCorrections`]; the lever
 /// arm in wheelbases, the bias of v_y in mean speeds.
 const SIGNAL_PRIORS: [(f64, f64, f64, f64); 6] = [
-    // Delay: commands reach the wheels after 0 to 0.1 s; 0.3 s would be undrivable.
-    (0.04, 0.06, 0.0, 0.3),
+    // Delay: commands reach the wheels after 0 to 0.1 s; a slow car can be driven with 0.4 s.
+    (0.04, 0.1, 0.0, 0.5),
     // Gain and offset: a servo's calibration.
-    (1.0, 0.05, 0.6, 1.5),
-    (0.0, 0.02, -0.15, 0.15),
-    // Lever arm: the odometry's point lies somewhere between the axles.
-    (0.0, 0.2, -0.8, 0.8),
+    (1.0, 0.03, 0.6, 1.5),
+    (0.0, 0.01, -0.15, 0.15),
+    // Lever arm: the odometry's point is meant to be the centre of gravity, or it is the rear axle (tried as a second start).
+    (0.0, 0.1, -0.8, 0.8),
     // Bias of v_y: a heading error of half a degree.
     (0.0, 0.01, -0.1, 0.1),
     // Gyroscope.
-    (0.0, 0.01, -0.1, 0.1),
+    (0.0, 0.005, -0.1, 0.1),
 ];
 
+/// Relaxation length in wheelbases: mean, sigma, low, high.
+const RELAXATION_SHARES: [f64; 4] = [0.12, 0.1, 0.005, 0.6];
 /// Steering delays that step 1 starts from, s.
-const DELAY_STARTS_S: [f64; 3] = [0.01, 0.06, 0.14];
+const DELAY_STARTS_S: [f64; 4] = [0.01, 0.06, 0.14, 0.3];
 /// Robustness of the window loss, in noises.
 const ROBUST_K: f64 = 3.0;
+/// Correlation length of residuals, in samples, before it is known.
+const FIRST_CORRELATION: f64 = 10.0;
 /// Step 1 looks at windows below this share of the largest lateral acceleration, and needs so many of them.
 const LOW_SHARE: f64 = 0.5;
 const LOW_WINDOWS: usize = 12;
-/// Standard errors of step 1 are widened by this before they hold the signals in step 2: its tires are too simple.
-const WIDENED: f64 = 2.0;
 
 /// Result of the direct fit.
 #[derive(Debug, Clone)]
@@ -47,12 +56,14 @@ pub(crate) struct Direct {
     pub(crate) corrections: SignalCorrections,
     /// The last fit, for intervals.
     pub(crate) fit: Fit,
+    /// Relaxation length of the tires that the fit allowed for.
+    pub(crate) relaxation_m: f64,
     /// Standard errors of the signal corrections.
     pub(crate) signal_errors: [Option<f64>; 6],
     /// What was held likely of them before the data were looked at.
     pub(crate) signal_priors: [Prior; 6],
-    /// Scatter of v_y and yaw rate about the rollouts, what residuals were divided by.
-    pub(crate) sigma: [f64; 2],
+    /// Scatter of v_y and yaw rate about the rollouts.
+    pub(crate) scatter: [f64; 2],
     pub(crate) slips: PerAxle<Slips>,
     pub(crate) peak: PerAxle<PeakEvidence>,
 }
@@ -70,15 +81,13 @@ pub(crate) struct Slips {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PeakEvidence {
     pub(crate) reached: bool,
-    /// Slope of the curve at the largest slips visited, over that at zero.
-    pub(crate) slope_left: f64,
-    /// Standard error of D over D.
-    pub(crate) relative_error: f64,
 }
 
-/// The slope that a curve may have left at the largest slips visited to count as past its knee.
-const SLOPE_LEFT: f64 = 0.25;
-/// Relative standard error of D above which the data do not determine it.
+/// Share of D that the curve has to reach within the slips visited.
+const PEAK_SHARE: f64 = 0.9;
+/// What the stiffness alone would make of the largest slip has to exceed D by this factor: a knee that comes earlier is the model's, not the tire's.
+const PEAK_EXCESS: f64 = 1.6;
+/// Relative standard error of the curve at the largest slip above which the data do not determine it.
 const PEAK_ERROR: f64 = 0.08;
 
 pub(crate) fn direct(
@@ -87,30 +96,84 @@ pub(crate) fn direct(
     prior: Option<FrictionPrior>,
     warm: Option<(&PacejkaParameters, &SignalCorrections)>,
 ) -> Result<Direct, IdentificationError> {
-    let model = TireRollout { vehicle, segments: &data.segments };
-    let training = data.part(Part::Training);
+    let fitter = Fitter { model: TireRollout::new(vehicle, data), data, training: data.part(Part::Training) };
     let mut lateral: Vec<f64> = data.samples(|s, k| (s.v_x_mps[k] * s.yaw_rate_radps[k]).abs()).collect();
     let limit_mps2 = quantile(&mut lateral, 0.98).unwrap_or(0.0);
-    let low = low_windows(data, &training, LOW_SHARE * limit_mps2);
+    let grip = (1.2 * limit_mps2 / GRAVITY_MPS2).clamp(0.1, 3.0);
 
-    // Step 1.
-    let mut all = signal_parameters(data, vehicle);
-    let signal_priors = std::array::from_fn(|j| all[j].prior.unwrap_or(Prior { mean: 0.0, sigma: 1.0 }));
-    let grip = 1.2 * limit_mps2 / GRAVITY_MPS2;
-    let first = MagicFormula::from_stiffness(8.0, crate::tires::C_PRIOR.mean, grip.clamp(0.1, 3.0), 0.0);
-    let start = warm.map_or(PacejkaParameters { front: first, rear: first }, |(tires, _)| *tires);
-    let mut tires: Vec<Parameter> =
-        [start.front, start.rear].iter().flat_map(|axle| parameters(axle, prior)).collect();
-    tires.append(&mut all);
-    let mut all = tires;
-    for j in [1, 2, 3, 5, 6, 7] {
-        all[j].free = false;
+    let first = MagicFormula::from_stiffness(8.0, C_PRIOR.mean, grip, 0.0);
+    let tires = warm.map_or(PacejkaParameters { front: first, rear: first }, |(tires, _)| *tires);
+    let mut all: Vec<Parameter> =
+        [tires.front, tires.rear].iter().flat_map(|axle| parameters(axle, prior)).collect();
+    all.extend(signal_parameters(data, vehicle));
+    let signal_priors =
+        std::array::from_fn(|j| all[SIGNALS + j].prior.unwrap_or(Prior { mean: 0.0, sigma: 1.0 }));
+    let delays_s = warm.map_or(DELAY_STARTS_S.to_vec(), |(_, c)| vec![c.steering_delay_s]);
+
+    let (start, weights) = fitter.first(&all, &delays_s, LOW_SHARE * limit_mps2)?;
+    restart(&mut all, &start.parameters);
+    let (mut all, mut found, weights) = fitter.signals(&all, weights);
+
+    let slips = fitter.visited(&found);
+    let peak = PerAxle { front: evidence(&found, 0, &slips.front), rear: evidence(&found, 4, &slips.rear) };
+    if let Some(prior) = prior.filter(|_| !(peak.front.reached && peak.rear.reached)) {
+        restart(&mut all, &found.parameters);
+        for (offset, axle) in [(0, &peak.front), (4, &peak.rear)] {
+            if !axle.reached {
+                all[offset + 2].free = false;
+                all[offset + 2].start = prior.mu;
+                all[offset + 1].start = C_PRIOR.mean;
+                all[offset + 3].start = E_PRIOR.mean;
+            }
+        }
+        found = fitter.solve(&all, &fitter.training, &weights.sigma, 30);
     }
-    let mut sigma = data.noise.map(|s| s.max(1e-6));
-    let delays: Vec<f64> = warm.map_or(DELAY_STARTS_S.to_vec(), |(_, c)| vec![c.steering_delay_s]);
-    let solve = |all: &[Parameter], windows: &[Window], sigma: &[f64; 2], iterations| {
+    if found.stop == StopReason::NotFinite || found.parameters.iter().any(|v| !v.is_finite()) {
+        return Err(IdentificationError::NotFinite { what: "direct fit" });
+    }
+    // Gain and lever arm that were left at their nominal values may still be off by their priors: their uncertainty is everyone's.
+    let mut open = all.clone();
+    restart(&mut open, &found.parameters);
+    for j in [GAIN, LEVER] {
+        open[j].free = true;
+    }
+    let errors = fitter.solve(&open, &fitter.training, &weights.sigma, 0);
+    let slips = fitter.visited(&found);
+    Ok(Direct {
+        tires: tires_of(&found.parameters),
+        corrections: corrections_of(&found.parameters),
+        relaxation_m: found.parameters[RELAXATION],
+        signal_errors: std::array::from_fn(|j| match errors.standard_error(SIGNALS + j) {
+            // The yaw rate's bias was known from the heading.
+            None if j == 5 => Some(signal_priors[5].sigma),
+            error => error,
+        }),
+        signal_priors,
+        fit: errors,
+        scatter: weights.scatter,
+        slips,
+        peak,
+    })
+}
+
+/// Place of the steering gain.
+const GAIN: usize = SIGNALS + 1;
+/// Place of the lever arm of v_y.
+const LEVER: usize = SIGNALS + 3;
+/// Freeing gain or lever arm has to lower the error of the validation part by this share, or they stay at their nominal values: a model that is
+/// too simple would use them to mend what is not theirs.
+const WORTH: f64 = 0.03;
+
+struct Fitter<'a> {
+    model: TireRollout<'a>,
+    data: &'a Data,
+    training: Vec<Window>,
+}
+
+impl Fitter<'_> {
+    fn solve(&self, all: &[Parameter], windows: &[Window], sigma: &[f64; 2], iterations: usize) -> Fit {
         let problem = Problem {
-            model: &model,
+            model: &self.model,
             windows,
             sigma,
             parameters: all,
@@ -118,72 +181,92 @@ pub(crate) fn direct(
             max_iterations: iterations,
         };
         fit(&problem, None)
-    };
-    let scan = delays.iter().map(|&delay_s| {
-        let mut all = all.clone();
-        all[SIGNALS].start = delay_s;
-        solve(&all, &low, &sigma, 8)
-    });
-    let best = scan
-        .min_by(|a, b| a.linearization.cost.total_cmp(&b.linearization.cost))
-        .filter(|f| f.stop != StopReason::NotFinite)
-        .ok_or(IdentificationError::NotFinite { what: "cost of the first fit" })?;
-    restart(&mut all, &best.parameters);
-    sigma = scatter(&model, &best, &low, &data.noise);
-    let signals = solve(&all, &low, &sigma, 20);
+    }
 
-    // Step 2.
-    restart(&mut all, &signals.parameters);
-    for j in SIGNALS..PARAMETERS {
-        let error = signals.standard_error(j).unwrap_or(f64::INFINITY);
-        if let Some(p) = all[j].prior {
-            let sigma = (WIDENED * error).min(p.sigma).max(1e-3 * p.sigma);
-            all[j].prior = Some(Prior { mean: signals.parameters[j], sigma });
+    /// Delay, offsets and stiffnesses on the windows of low lateral acceleration, from several delays; the shape of the tire curves, gain and lever
+    /// arm are held.
+    fn first(
+        &self,
+        all: &[Parameter],
+        delays_s: &[f64],
+        below_mps2: f64,
+    ) -> Result<(Fit, Weights), IdentificationError> {
+        let low = low_windows(self.data, &self.training, below_mps2);
+        let mut all = all.to_vec();
+        for j in [1, 2, 3, 5, 6, 7, GAIN, LEVER] {
+            all[j].free = false;
         }
+        let sigma = self.data.noise.map(|s| FIRST_CORRELATION.sqrt() * s.max(1e-6));
+        let scan = delays_s.iter().map(|&delay_s| {
+            let mut all = all.clone();
+            all[SIGNALS].start = delay_s;
+            self.solve(&all, &low, &sigma, 8)
+        });
+        let best = scan
+            .min_by(|a, b| a.linearization.cost.total_cmp(&b.linearization.cost))
+            .filter(|f| f.stop != StopReason::NotFinite)
+            .ok_or(IdentificationError::NotFinite { what: "cost of the first fit" })?;
+        let weights = weights(&self.model, &best, &low, &self.data.noise);
+        Ok((best, weights))
     }
-    for j in [1, 2, 3, 5, 6, 7] {
-        all[j].free = true;
-    }
-    let mut found = solve(&all, &training, &sigma, 15);
-    sigma = scatter(&model, &found, &training, &data.noise);
-    restart(&mut all, &found.parameters);
-    found = solve(&all, &training, &sigma, 30);
 
-    // Step 3.
-    let slips = visited(&model, &found, &training);
-    let peak = PerAxle { front: evidence(&found, 0, &slips.front), rear: evidence(&found, 4, &slips.rear) };
-    if !(peak.front.reached && peak.rear.reached) {
-        restart(&mut all, &found.parameters);
-        for (offset, axle) in [(0, &peak.front), (4, &peak.rear)] {
-            if !axle.reached {
-                all[offset + 2].free = false;
-                all[offset + 2].start = prior.map_or(found.parameters[offset + 2].max(grip), |p| p.mu);
-                all[offset + 1].start = crate::tires::C_PRIOR.mean;
-                all[offset + 3].start = crate::tires::E_PRIOR.mean;
+    /// All parameters on all windows; gain and lever arm freed where the validation part says that it is worth it.
+    fn signals(&self, all: &[Parameter], mut weights: Weights) -> (Vec<Parameter>, Fit, Weights) {
+        let validation = self.data.part(Part::Validation);
+        let mut nominal = all.to_vec();
+        nominal[GAIN].free = false;
+        nominal[LEVER].free = false;
+        let mut found = self.solve(&nominal, &self.training, &weights.sigma, 15);
+        for _ in 0..2 {
+            weights = self::weights(&self.model, &found, &self.training, &self.data.noise);
+            restart(&mut nominal, &found.parameters);
+            found = self.solve(&nominal, &self.training, &weights.sigma, 15);
+        }
+        let error = |fit: &Fit| -> f64 {
+            let p = std::array::from_fn(|j| fit.parameters[j]);
+            rollout_errors(&self.model, &p, &validation, &weights.scatter).normalized
+        };
+        let mut best = (error(&found), nominal.clone(), found);
+        for freed in [&[LEVER][..], &[GAIN], &[GAIN, LEVER]] {
+            let mut trial = nominal.clone();
+            freed.iter().for_each(|&j| trial[j].free = true);
+            let fit = self.solve(&trial, &self.training, &weights.sigma, 15);
+            let e = error(&fit);
+            if e < (1.0 - WORTH) * best.0 {
+                best = (e, trial, fit);
             }
         }
-        found = solve(&all, &training, &sigma, 30);
+        let (_, mut all, fit) = best;
+        let weights = self::weights(&self.model, &fit, &self.training, &self.data.noise);
+        restart(&mut all, &fit.parameters);
+        let fit = self.solve(&all, &self.training, &weights.sigma, 15);
+        (all, fit, weights)
     }
-    if found.stop == StopReason::NotFinite || found.parameters.iter().any(|v| !v.is_finite()) {
-        return Err(IdentificationError::NotFinite { what: "direct fit" });
+
+    /// Slip angles along the fitted trajectories.
+    fn visited(&self, fit: &Fit) -> PerAxle<Slips> {
+        let mut slips = PerAxle { front: Vec::new(), rear: Vec::new() };
+        let car = SingleTrack::new(self.model.vehicle, &tires_of(&fit.parameters));
+        for (window, start) in self.training.iter().zip(&fit.starts) {
+            self.model.trajectory(&fit.parameters, *start, window, |state, input| {
+                let (front, rear) = car.slip_angles_rad(state, input);
+                slips.front.push(front);
+                slips.rear.push(rear);
+            });
+        }
+        slips.map(|samples_rad| {
+            let mut sorted = samples_rad.clone();
+            let low = quantile(&mut sorted, 0.005).unwrap_or(f64::NAN);
+            let high = quantile(&mut sorted, 0.995).unwrap_or(f64::NAN);
+            Slips { samples_rad, range_rad: Range { low, high } }
+        })
     }
-    let slips = visited(&model, &found, &training);
-    Ok(Direct {
-        tires: tires_of(&found.parameters),
-        corrections: corrections_of(&found.parameters),
-        signal_errors: std::array::from_fn(|j| found.standard_error(SIGNALS + j)),
-        signal_priors,
-        fit: found,
-        sigma,
-        slips,
-        peak,
-    })
 }
 
 /// The signal parameters with their priors, scaled to the car.
 fn signal_parameters(data: &Data, vehicle: &VehicleParameters) -> Vec<Parameter> {
     let scales = [1.0, 1.0, 1.0, vehicle.wheelbase_m(), data.mean_speed_mps, 1.0];
-    SIGNAL_PRIORS
+    let mut all: Vec<Parameter> = SIGNAL_PRIORS
         .iter()
         .zip(scales)
         .map(|(&(mean, sigma, low, high), scale)| Parameter {
@@ -193,7 +276,33 @@ fn signal_parameters(data: &Data, vehicle: &VehicleParameters) -> Vec<Parameter>
             free: true,
             prior: Some(Prior { mean: mean * scale, sigma: sigma * scale }),
         })
-        .collect()
+        .collect();
+    if let Some(bias) = yaw_rate_bias(data) {
+        all[5].start = bias.mean.clamp(all[5].low, all[5].high);
+        all[5].prior = Some(bias);
+        all[5].free = false;
+    }
+    let [mean, sigma, low, high] = RELAXATION_SHARES.map(|share| share * vehicle.wheelbase_m());
+    all.push(Parameter { start: mean, low, high, free: true, prior: Some(Prior { mean, sigma }) });
+    all
+}
+
+/// Bias of the yaw rate against the heading, which no tire has a say in; `None` without a pose.
+fn yaw_rate_bias(data: &Data) -> Option<Prior> {
+    // Differences over windows: white noise of the heading averages out.
+    let mut differences: Vec<f64> = Vec::new();
+    for (window, _) in &data.windows {
+        let s = &data.segments[window.segment];
+        let end = window.from + window.len - 1;
+        let turned = s.yaw_rad.get(end)? - s.yaw_rad[window.from];
+        let rate = &s.yaw_rate_radps[window.from..=end];
+        let integral = rate.windows(2).map(|w| 0.5 * (w[0] + w[1])).sum::<f64>() * s.dt_s;
+        differences.push((integral - turned) / ((window.len - 1) as f64 * s.dt_s));
+    }
+    let n = differences.len() as f64;
+    let mean = median(&mut differences)?;
+    let spread = median(&mut differences.iter().map(|d| (d - mean).abs()).collect::<Vec<_>>())? / 0.6745;
+    Some(Prior { mean, sigma: (1.2533 * spread / n.sqrt()).max(1e-4) })
 }
 
 fn restart(all: &mut [Parameter], at: &[f64]) {
@@ -213,53 +322,65 @@ fn low_windows(data: &Data, windows: &[Window], below_mps2: f64) -> Vec<Window> 
     if low.len() < LOW_WINDOWS { windows.to_vec() } else { low }
 }
 
-/// Typical scatter of each channel about the fit: the median window's root mean square, at least the noise.
-fn scatter(model: &TireRollout<'_>, fit: &Fit, windows: &[Window], noise: &[f64; 2]) -> [f64; 2] {
+/// What residuals are divided by: the scatter of each channel about the fit (the median window's root mean square, at least the noise),
+/// times the root of their correlation length. Errors of the model are correlated; counted as independent they would overrule every prior.
+fn weights(model: &TireRollout<'_>, fit: &Fit, windows: &[Window], noise: &[f64; 2]) -> Weights {
     let (mut predicted, mut measured) = (Vec::new(), Vec::new());
     let mut squares = [Vec::new(), Vec::new()];
+    let len = windows.first().map_or(0, |w| w.len);
+    let mut covariance = [vec![0.0; len], vec![0.0; len]];
     for (window, start) in windows.iter().zip(&fit.starts) {
         model.rollout(&fit.parameters, *start, window, &mut predicted);
         model.measured(window, &mut measured);
         for channel in 0..2 {
-            let errors = predicted.iter().zip(&measured).skip(channel).step_by(2);
-            squares[channel].push(errors.map(|(p, m)| (p - m).powi(2)).sum::<f64>() / window.len as f64);
+            let errors: Vec<f64> =
+                predicted.iter().zip(&measured).skip(channel).step_by(2).map(|(p, m)| p - m).collect();
+            squares[channel].push(errors.iter().map(|e| e * e).sum::<f64>() / window.len as f64);
+            for (lag, sum) in covariance[channel].iter_mut().enumerate() {
+                *sum += errors.iter().zip(&errors[lag..]).map(|(a, b)| a * b).sum::<f64>();
+            }
         }
     }
-    std::array::from_fn(|c| median(&mut squares[c]).unwrap_or(0.0).sqrt().max(0.5 * noise[c]).max(1e-6))
+    let scatter =
+        std::array::from_fn(|c| median(&mut squares[c]).unwrap_or(0.0).sqrt().max(0.5 * noise[c]).max(1e-6));
+    let length = |c: usize| {
+        let rho = covariance[c].iter().skip(1).map(|v| v / covariance[c][0].max(f64::MIN_POSITIVE));
+        1.0 + 2.0 * rho.take_while(|r| *r > 0.0).sum::<f64>()
+    };
+    Weights { scatter, sigma: std::array::from_fn(|c| scatter[c] * length(c).sqrt()) }
 }
 
-/// Slip angles along the fitted trajectories.
-fn visited(model: &TireRollout<'_>, fit: &Fit, windows: &[Window]) -> PerAxle<Slips> {
-    let mut slips = PerAxle { front: Vec::new(), rear: Vec::new() };
-    let mut trajectory = Vec::new();
-    let car = SingleTrack::new(model.vehicle, &tires_of(&fit.parameters));
-    for (window, start) in windows.iter().zip(&fit.starts) {
-        crate::judge::trajectory(model, &fit.parameters, *start, window, &mut trajectory);
-        for (state, input) in &trajectory {
-            let (front, rear) = car.slip_angles_rad(state, input);
-            slips.front.push(front);
-            slips.rear.push(rear);
-        }
-    }
-    slips.map(|samples_rad| {
-        let mut sorted = samples_rad.clone();
-        let low = quantile(&mut sorted, 0.005).unwrap_or(f64::NAN);
-        let high = quantile(&mut sorted, 0.995).unwrap_or(f64::NAN);
-        Slips { samples_rad, range_rad: Range { low, high } }
-    })
+#[derive(Debug, Clone, Copy)]
+struct Weights {
+    scatter: [f64; 2],
+    sigma: [f64; 2],
 }
 
-/// Whether an axle's peak shows: the curve has flattened within the slips visited, and the data fix D.
+/// Whether an axle's peak shows: the curve has flattened within the slips visited, and the data fix it there.
 fn evidence(fit: &Fit, offset: usize, slips: &Slips) -> PeakEvidence {
-    let axle = tires_of(&fit.parameters);
-    let axle = if offset == 0 { axle.front } else { axle.rear };
+    let tires = tires_of(&fit.parameters);
+    let axle = if offset == 0 { tires.front } else { tires.rear };
     let furthest = slips.range_rad.low.abs().max(slips.range_rad.high.abs());
-    let step = 1e-3 * furthest.max(1e-6);
-    let slope =
-        (axle.normalized_force(furthest + step) - axle.normalized_force(furthest - step)) / (2.0 * step);
-    let slope_left = slope / axle.normalized_stiffness();
-    let relative_error = fit.standard_error(offset + 2).map_or(f64::INFINITY, |s| s / axle.d);
-    let bounded = fit.on_bound.contains(&(offset + 2));
-    let reached = slope_left < SLOPE_LEFT && relative_error < PEAK_ERROR && !bounded;
-    PeakEvidence { reached, slope_left, relative_error }
+    let force = axle.max_force_within(furthest);
+    let covariance = fit.covariance_of(&[offset, offset + 1, offset + 2, offset + 3]);
+    let error = force_error(&axle, furthest, covariance.as_ref());
+    let reached = force > PEAK_SHARE * axle.d
+        && axle.normalized_stiffness() * furthest > PEAK_EXCESS * axle.d
+        && error < PEAK_ERROR * force
+        && !fit.on_bound.contains(&(offset + 2));
+    PeakEvidence { reached }
+}
+
+/// Standard error of F_y/F_z at a slip, from the covariance of (k, C, D, E); infinite without one.
+pub(crate) fn force_error(axle: &MagicFormula, slip_rad: f64, covariance: Option<&DMatrix<f64>>) -> f64 {
+    let Some(covariance) = covariance else { return f64::INFINITY };
+    let at = [axle.normalized_stiffness(), axle.c, axle.d, axle.e];
+    let force =
+        |v: &[f64; 4]| MagicFormula::from_stiffness(v[0], v[1], v[2], v[3]).normalized_force(slip_rad);
+    let slope = DVector::from_fn(4, |j, _| {
+        let h = 1e-5 * at[j].abs().max(1e-2);
+        let moved = |by: f64| std::array::from_fn(|i| if i == j { at[i] + by } else { at[i] });
+        (force(&moved(h)) - force(&moved(-h))) / (2.0 * h)
+    });
+    (slope.transpose() * covariance * slope)[(0, 0)].max(0.0).sqrt()
 }

@@ -1,9 +1,7 @@
 //! How well a set predicts: errors of rollouts and of single steps.
 
-use gripsight_vehicle::{Input, SingleTrack, State};
-
 use crate::data::Data;
-use crate::rollout::{PARAMETERS, SIGNALS, TireRollout, delayed, substep_s, tires_of};
+use crate::rollout::{PARAMETERS, SIGNALS, TireRollout};
 use crate::shooting::{Parameter, Problem, Rollout, Window, fit};
 
 /// Root mean square errors over windows.
@@ -20,35 +18,6 @@ impl Errors {
         let mean = squares.map(|s| s / samples.max(1) as f64);
         let normalized = (0.5 * (mean[0] / noise[0].powi(2) + mean[1] / noise[1].powi(2))).sqrt();
         Self { rms: mean.map(f64::sqrt), normalized }
-    }
-}
-
-/// States and inputs of a rollout, signals corrected, at every sample of a window.
-pub(crate) fn trajectory(
-    model: &TireRollout<'_>,
-    p: &[f64],
-    start: [f64; 2],
-    window: &Window,
-    out: &mut Vec<(State, Input)>,
-) {
-    out.clear();
-    let segment = &model.segments[window.segment];
-    let car = SingleTrack::new(model.vehicle, &tires_of(p));
-    let input = |k: usize| Input {
-        v_x_mps: segment.v_x_mps[k],
-        steering_rad: delayed(&segment.steering_rad, k, p[SIGNALS] / segment.dt_s) * p[SIGNALS + 1]
-            + p[SIGNALS + 2],
-    };
-    let end = window.from + window.len;
-    let slowest = segment.v_x_mps[window.from..end].iter().copied().fold(f64::INFINITY, f64::min);
-    let step_s = substep_s(p[0].max(p[4]), slowest);
-    let mut x = State { v_y_mps: start[0], yaw_rate_radps: start[1] };
-    for k in window.from..end {
-        let here = input(k);
-        out.push((x, here));
-        if k + 1 < end {
-            x = car.step(x, &here, &input(k + 1), segment.dt_s, step_s);
-        }
     }
 }
 

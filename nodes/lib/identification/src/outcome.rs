@@ -223,6 +223,8 @@ pub struct Outcome {
     pub signal_intervals: SignalEstimates,
     /// Corrections that rest on their priors.
     pub weak_signals: Vec<WeakSignal>,
+    /// Relaxation length of the tires that the direct fit allowed for.
+    pub relaxation_m: f64,
     /// Errors on held-out data.
     pub rmse: RmseReport,
     /// Rollout error over its horizon.

@@ -1,10 +1,9 @@
 //! What the report draws: tire curves with their band and the density of the data, and time series.
 
 use gripsight_vehicle::{MagicFormula, PacejkaParameters, SingleTrack};
-use nalgebra::{DMatrix, DVector};
 
-use crate::direct::Slips;
-use crate::judge::{best_starts, trajectory};
+use crate::direct::{Slips, force_error};
+use crate::judge::best_starts;
 use crate::rollout::{PARAMETERS, TireRollout, tires_of};
 use crate::shooting::{Rollout, Window};
 use crate::{Estimate, Identification, PerAxle, TireCurve, Trace};
@@ -41,7 +40,8 @@ fn curve(
         }
     }
     let covariance = run.direct.fit.covariance_of(&[offset, offset + 1, offset + 2, offset + 3]);
-    let half: Vec<f64> = slip_rad.iter().map(|&a| band(axle, a, covariance.as_ref())).collect();
+    let half: Vec<f64> =
+        slip_rad.iter().map(|&a| Estimate::Z90 * force_error(axle, a, covariance.as_ref())).collect();
     let identified: Vec<f64> = slip_rad.iter().map(|&a| axle.normalized_force(a)).collect();
     TireCurve {
         initial: slip_rad.iter().map(|&a| initial.normalized_force(a)).collect(),
@@ -53,25 +53,11 @@ fn curve(
     }
 }
 
-/// Half-width of the 90 % band of F_y/F_z at a slip, from the covariance of (k, C, D, E).
-fn band(axle: &MagicFormula, slip_rad: f64, covariance: Option<&DMatrix<f64>>) -> f64 {
-    let Some(covariance) = covariance else { return f64::NAN };
-    let at = [axle.normalized_stiffness(), axle.c, axle.d, axle.e];
-    let force =
-        |v: &[f64; 4]| MagicFormula::from_stiffness(v[0], v[1], v[2], v[3]).normalized_force(slip_rad);
-    let slope = DVector::from_fn(4, |j, _| {
-        let h = 1e-5 * at[j].abs().max(1e-2);
-        let moved = |by: f64| std::array::from_fn(|i| if i == j { at[i] + by } else { at[i] });
-        (force(&moved(h)) - force(&moved(-h))) / (2.0 * h)
-    });
-    Estimate::Z90 * (slope.transpose() * covariance * slope)[(0, 0)].max(0.0).sqrt()
-}
-
 /// Time series over all windows.
 pub(crate) fn trace(run: &Identification, before: &[f64; PARAMETERS], after: &[f64; PARAMETERS]) -> Trace {
-    let model = TireRollout { vehicle: &run.vehicle, segments: &run.data.segments };
+    let model = TireRollout::new(&run.vehicle, &run.data);
     let windows: Vec<Window> = run.data.windows.iter().map(|(w, _)| *w).collect();
-    let noise = run.direct.sigma;
+    let noise = run.direct.scatter;
     let (starts_before, starts_after) =
         (best_starts(&model, before, &windows, &noise), best_starts(&model, after, &windows, &noise));
     let car = SingleTrack::new(&run.vehicle, &tires_of(after));
@@ -80,7 +66,8 @@ pub(crate) fn trace(run: &Identification, before: &[f64; PARAMETERS], after: &[f
     for ((window, start_before), start_after) in windows.iter().zip(starts_before).zip(starts_after) {
         model.rollout(before, start_before, window, &mut old);
         model.rollout(after, start_after, window, &mut new);
-        trajectory(&model, after, start_after, window, &mut states);
+        states.clear();
+        model.trajectory(after, start_after, window, |x, u| states.push((*x, *u)));
         let s = &model.segments[window.segment];
         for (i, k) in (window.from..window.from + window.len).enumerate() {
             let next = (k + 1).min(s.len() - 1);

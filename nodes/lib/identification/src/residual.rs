@@ -10,9 +10,7 @@
 
 use std::ops::ControlFlow;
 
-use gripsight_s4::{
-    Normalization, ResidualNetwork, Sequence, TrainingConfig, TrainingSet, train,
-};
+use gripsight_s4::{Normalization, ResidualNetwork, Sequence, TrainingConfig, TrainingSet, train};
 use gripsight_signals::{DataHealth, Segment, StateSequence};
 use gripsight_vehicle::{Input, MagicFormula, PacejkaParameters, SingleTrack, State, VehicleParameters};
 use nalgebra::{Const, Matrix4, Vector4};

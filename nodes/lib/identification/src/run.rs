@@ -209,10 +209,10 @@ impl Identification {
 
     /// Error of rollouts on the validation part, in noises.
     pub(crate) fn validation_error(&self, tires: &PacejkaParameters) -> f64 {
-        let rollout = TireRollout { vehicle: &self.vehicle, segments: &self.data.segments };
+        let rollout = TireRollout::new(&self.vehicle, &self.data);
         let windows = self.data.part(Part::Validation);
-        let p = vector_of(tires, &self.direct.corrections);
-        rollout_errors(&rollout, &p, &windows, &self.direct.sigma).normalized
+        let p = vector_of(tires, &self.direct.corrections, self.direct.relaxation_m);
+        rollout_errors(&rollout, &p, &windows, &self.direct.scatter).normalized
     }
 }
 

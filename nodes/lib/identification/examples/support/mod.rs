@@ -1,0 +1,118 @@
+//! What the examples share: runs with their truth, and the score against it.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use gripsight_bag::{TopicMap, read_sequences};
+use gripsight_identification::nelder_mead::{NelderMeadConfig, minimize};
+use gripsight_identification::{PerAxle, tires::BOUNDS};
+use gripsight_signals::{StateSequence, WindowConfig};
+use gripsight_vehicle::{MagicFormula, PacejkaParameters, VehicleParameters};
+
+/// True slips and normalised forces of an axle.
+#[derive(Debug, Clone, Default)]
+pub struct Truth {
+    pub slip_rad: Vec<f64>,
+    pub force: Vec<f64>,
+}
+
+/// A run with its truth.
+pub struct Run {
+    pub name: String,
+    pub vehicle: VehicleParameters,
+    pub sequence: StateSequence,
+    pub truth: PerAxle<Truth>,
+}
+
+/// The first window of a bag folder (`NAME/NAME.mcap`, `vehicle.yaml`).
+pub fn read(folder: &Path, length_s: f64) -> Result<(VehicleParameters, StateSequence)> {
+    let name = folder.file_name().context("no folder")?.to_string_lossy().into_owned();
+    let vehicle = VehicleParameters::from_ros_yaml(&std::fs::read_to_string(folder.join("vehicle.yaml"))?)?;
+    let window = WindowConfig { length_s, hop_s: length_s };
+    let (sequences, _) = read_sequences(&folder.join(format!("{name}.mcap")), &TopicMap::default(), window)?;
+    Ok((vehicle, sequences.into_iter().next().context("no sequence")?))
+}
+
+/// A bag folder with `truth_axle_forces.csv`.
+pub fn read_with_truth(folder: &Path, length_s: f64) -> Result<Run> {
+    let (vehicle, sequence) = read(folder, length_s)?;
+    let mut truth = PerAxle::<Truth>::default();
+    let mut csv = csv::Reader::from_path(folder.join("truth_axle_forces.csv"))?;
+    let header = csv.headers()?.clone();
+    let column = |name: &str| header.iter().position(|h| h == name);
+    let wanted = ["stamp_s", "f_y_front_n", "f_y_rear_n"].map(|n| column(n).unwrap_or(0));
+    let optional =
+        ["f_z_front_n", "f_z_rear_n", "v_x_mps", "v_y_mps", "yaw_rate_radps", "steering_rad"].map(column);
+    let mut at = 0;
+    for row in csv.records() {
+        let row = row?;
+        let get = |i: usize| row[i].trim().parse::<f64>();
+        let stamp_ns = (get(wanted[0])? * 1e9).round() as i64;
+        let time_s = (stamp_ns - sequence.start_stamp_ns) as f64 * 1e-9;
+        let maybe = |i: Option<usize>| i.map(get).transpose();
+        let (v_x, v_y, yaw_rate, steering, loads);
+        if let (Some(vx), Some(vy), Some(r), Some(d)) =
+            (maybe(optional[2])?, maybe(optional[3])?, maybe(optional[4])?, maybe(optional[5])?)
+        {
+            (v_x, v_y, yaw_rate, steering) = (vx, vy, r, d);
+            loads = [maybe(optional[0])?.unwrap_or(1.0), maybe(optional[1])?.unwrap_or(1.0)];
+        } else {
+            // No true states: the odometry at that stamp, and the static loads of the mass that the forces imply.
+            while at + 1 < sequence.len() && f64::from(sequence.time_s[at]) < time_s - 1e-3 {
+                at += 1;
+            }
+            if (f64::from(sequence.time_s[at]) - time_s).abs() > 1e-3 {
+                continue;
+            }
+            (v_x, v_y) = (f64::from(sequence.v_x_mps[at]), f64::from(sequence.v_y_mps[at]));
+            (yaw_rate, steering) =
+                (f64::from(sequence.yaw_rate_radps[at]), f64::from(sequence.steering_rad[at]));
+            let scale = 2033.0 / vehicle.mass_kg;
+            loads = [vehicle.static_load_front_n() * scale, vehicle.static_load_rear_n() * scale];
+        }
+        if time_s > sequence.duration_s() || v_x < 1.0 {
+            continue;
+        }
+        truth.front.slip_rad.push(steering - ((v_y + vehicle.l_f_m * yaw_rate) / v_x).atan());
+        truth.rear.slip_rad.push(-((v_y - vehicle.l_r_m * yaw_rate) / v_x).atan());
+        truth.front.force.push(get(wanted[1])? / loads[0]);
+        truth.rear.force.push(get(wanted[2])? / loads[1]);
+    }
+    Ok(Run {
+        name: folder.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        vehicle,
+        sequence,
+        truth,
+    })
+}
+
+/// Root mean square error of F_y/F_z of an axle.
+pub fn rmse(axle: &MagicFormula, truth: &Truth) -> f64 {
+    let errors =
+        truth.slip_rad.iter().zip(&truth.force).map(|(&a, f)| (axle.normalized_force(a) - f).powi(2));
+    (errors.sum::<f64>() / truth.force.len() as f64).sqrt()
+}
+
+/// The best that four parameters can do: fitted to the true forces, from several starts.
+pub fn floor(truth: &Truth) -> Result<(MagicFormula, f64)> {
+    let axle = |x: &[f64]| MagicFormula { b: x[0], c: x[1], d: x[2], e: x[3] };
+    let config = NelderMeadConfig { max_evaluations: 2000, ..NelderMeadConfig::default() };
+    // A part of the samples says where; all say how much.
+    let thin = Truth {
+        slip_rad: truth.slip_rad.iter().copied().step_by(5).collect(),
+        force: truth.force.iter().copied().step_by(5).collect(),
+    };
+    let mut best = (axle(&[10.0, 1.4, 1.0, 0.0]), f64::INFINITY);
+    for start in [[4.0, 1.3, 0.6, 0.0], [10.0, 1.4, 1.0, 0.0], [20.0, 1.8, 1.2, -1.0]] {
+        let found = minimize(|x| rmse(&axle(x), &thin), &start, &BOUNDS, &config)?;
+        if found.cost < best.1 {
+            best = (axle(&found.x), found.cost);
+        }
+    }
+    Ok((best.0, rmse(&best.0, truth)))
+}
+
+/// RMSE front and rear.
+pub fn score(tires: &PacejkaParameters, truth: &PerAxle<Truth>) -> [f64; 2] {
+    [rmse(&tires.front, &truth.front), rmse(&tires.rear, &truth.rear)]
+}
