@@ -110,7 +110,6 @@ impl Data {
             windows,
             mean_speed_mps,
             a_x_mps2,
-            v_y_explained,
             noise,
         })
     }
