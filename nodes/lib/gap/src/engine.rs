@@ -87,7 +87,7 @@ pub(crate) struct Engine<'a> {
     /// Weights of the channels: what residuals are divided by when fitting.
     pub(crate) sigma: Vec<f64>,
     /// 0 for a 1:10 car, 1 for a full-size one: where between the two sizes of an effect this car lies.
-    size_place: f64,
+    pub(crate) size_place: f64,
     pub(crate) substep_s: f64,
 }
 

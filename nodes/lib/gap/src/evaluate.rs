@@ -24,8 +24,9 @@ const RESAMPLES: usize = 400;
 
 /// Residuals of a window that are free after its start state and the means taken off are counted.
 fn freedom(recording: &Recording, len: usize) -> f64 {
-    let means = recording.channels.iter().filter(|c| c.without_mean()).count();
-    ((len * recording.channels.len()) as f64 - 2.0 - means as f64).max(1.0)
+    let scored = || recording.channels.iter().filter(|c| c.scored());
+    let means = scored().filter(|c| c.without_mean()).count();
+    ((len * scored().count()) as f64 - 2.0 - means as f64).max(1.0)
 }
 
 /// Mean squared error over the noise variance of every block: (sum of squares, degrees of freedom).

@@ -105,7 +105,7 @@ impl Flexible {
                 Channel::Speed => &mut out.v_x_mps,
                 // Both share one series; the odometry's terms serve for both.
                 Channel::YawRate => &mut out.yaw_rate_radps,
-                Channel::Gyro => continue,
+                Channel::Gyro | Channel::LateralKinematics => continue,
             };
             let before = series.clone();
             for k in 0..n {

@@ -13,6 +13,8 @@ use crate::smooth::{local_quadratic, median};
 
 /// Name of the identity between yaw rate and heading.
 pub(crate) const HEADING: &str = "yaw_rate = heading'";
+/// Name of the identity between lateral acceleration and lateral motion.
+pub(crate) const LATERAL: &str = "a_y = v_y' + v_x r";
 
 /// One identity, tested.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -33,33 +35,34 @@ pub struct Identity {
 
 /// Smoothing to each side.
 const SMOOTH_S: f64 = 0.15;
-/// Below this share of the signal's own spread, two sides agree too well to be two measurements.
-const DERIVED_SHARE: f64 = 3e-3;
+/// Noise of two measurements has nothing in common; where the fastest changes of two sides do, one was made of the other.
+const DERIVED_CORRELATION: f64 = 0.35;
+/// No accelerometer on a driving car is this quiet.
+const QUIET_MPS2: f64 = 0.02;
 
 /// Tests the identities on even stretches.
 pub(crate) fn check(segments: &[Segment]) -> Vec<Identity> {
-    let d = |s: &Segment, x: &[f64]| local_quadratic(x, half(s), s.dt_s);
-    let a_x = |s: &Segment| {
+    let a_x = |s: &Segment, half: usize| {
         (!s.a_x_mps2.is_empty()).then(|| {
-            let (v_y, _) = d(s, &s.v_y_mps);
-            let (r, _) = d(s, &s.yaw_rate_radps);
-            let (_, rate) = d(s, &s.v_x_mps);
-            (s.a_x_mps2.clone(), (0..s.len()).map(|k| rate[k] - v_y[k] * r[k]).collect())
+            let rate = local_quadratic(&s.v_x_mps, half, s.dt_s).1;
+            let right = (0..s.len()).map(|k| rate[k] - s.v_y_mps[k] * s.yaw_rate_radps[k]).collect();
+            (s.a_x_mps2.clone(), right)
         })
     };
-    let a_y = |s: &Segment| {
+    let a_y = |s: &Segment, half: usize| {
         (!s.a_y_mps2.is_empty()).then(|| {
-            let (v_x, _) = d(s, &s.v_x_mps);
-            let (r, _) = d(s, &s.yaw_rate_radps);
-            let (_, rate) = d(s, &s.v_y_mps);
-            (s.a_y_mps2.clone(), (0..s.len()).map(|k| rate[k] + v_x[k] * r[k]).collect())
+            let rate = local_quadratic(&s.v_y_mps, half, s.dt_s).1;
+            let right = (0..s.len()).map(|k| rate[k] + s.v_x_mps[k] * s.yaw_rate_radps[k]).collect();
+            (s.a_y_mps2.clone(), right)
         })
     };
-    let heading =
-        |s: &Segment| (!s.yaw_rad.is_empty()).then(|| (s.yaw_rate_radps.clone(), d(s, &s.yaw_rad).1));
+    let heading = |s: &Segment, half: usize| {
+        (!s.yaw_rad.is_empty())
+            .then(|| (s.yaw_rate_radps.clone(), local_quadratic(&s.yaw_rad, half, s.dt_s).1))
+    };
     vec![
         test("a_x = v_x' - v_y r", segments, &a_x),
-        test("a_y = v_y' + v_x r", segments, &a_y),
+        test(LATERAL, segments, &a_y),
         test(HEADING, segments, &heading),
     ]
 }
@@ -70,19 +73,23 @@ fn half(s: &Segment) -> usize {
 
 type Sides = (Vec<f64>, Vec<f64>);
 
-fn test(name: &'static str, segments: &[Segment], sides: &dyn Fn(&Segment) -> Option<Sides>) -> Identity {
+fn test(name: &'static str, segments: &[Segment], sides: &dyn Fn(&Segment, usize) -> Option<Sides>) -> Identity {
     let mut pairs: Vec<(f64, f64)> = Vec::new();
     let mut rough: Vec<f64> = Vec::new();
+    let mut fast: Vec<(f64, f64)> = Vec::new();
     for s in segments {
-        let Some((left, right)) = sides(s) else { continue };
-        let (smooth, _) = local_quadratic(&left, half(s), s.dt_s);
-        let edge = half(s);
-        if s.len() <= 2 * edge {
+        let half = half(s);
+        let (Some((left, right)), Some((_, direct))) = (sides(s, half), sides(s, 1)) else { continue };
+        if s.len() <= 2 * half + 2 {
             continue;
         }
-        for k in edge..s.len() - edge {
-            pairs.push((smooth[k], right[k]));
-            rough.push((left[k] - smooth[k]).abs());
+        let smooth = |x: &[f64]| local_quadratic(x, half, s.dt_s).0;
+        let (slow_left, slow_right) = (smooth(&left), smooth(&right));
+        for k in half..s.len() - half {
+            pairs.push((slow_left[k], slow_right[k]));
+            rough.push((left[k] - slow_left[k]).abs());
+            let second = |x: &[f64]| x[k + 1] - 2.0 * x[k] + x[k - 1];
+            fast.push((second(&left), second(&direct)));
         }
     }
     let missing = Identity {
@@ -100,13 +107,13 @@ fn test(name: &'static str, segments: &[Segment], sides: &dyn Fn(&Segment) -> Op
     let (ml, mr) = (pairs.iter().map(|p| p.0).sum::<f64>() / n, pairs.iter().map(|p| p.1).sum::<f64>() / n);
     let cov = pairs.iter().map(|p| (p.0 - ml) * (p.1 - mr)).sum::<f64>() / n;
     let var_r = pairs.iter().map(|p| (p.1 - mr).powi(2)).sum::<f64>() / n;
-    let var_l = pairs.iter().map(|p| (p.0 - ml).powi(2)).sum::<f64>() / n;
     let slope = if var_r > 0.0 { cov / var_r } else { 1.0 };
     let offset = ml - slope * mr;
     let left_over = median(pairs.iter().map(|p| (p.0 - slope * p.1 - offset).abs()).collect()) / 0.674_5;
-    let plain = median(pairs.iter().map(|p| (p.0 - p.1).abs()).collect()) / 0.674_5;
     let noise = (median(rough) / 0.674_5).max(1e-9);
-    let derived = plain < DERIVED_SHARE * var_l.sqrt();
+    let quiet = crate::noise::of(segments.iter().map(|s| s.a_y_mps2.as_slice())) < QUIET_MPS2;
+    let alike = correlation(&fast) > DERIVED_CORRELATION || (name == LATERAL && quiet);
+    let derived = alike && left_over < noise;
     let finding = if derived {
         "one side was derived from the other: says nothing".to_owned()
     } else {
@@ -120,4 +127,19 @@ fn test(name: &'static str, segments: &[Segment], sides: &dyn Fn(&Segment) -> Op
         rms_over_noise: left_over / noise,
         finding,
     }
+}
+
+/// Correlation of the fastest changes, with outliers clipped.
+fn correlation(pairs: &[(f64, f64)]) -> f64 {
+    let scale = |f: &dyn Fn(&(f64, f64)) -> f64| median(pairs.iter().map(|p| f(p).abs()).collect()).max(1e-12);
+    let (a, b) = (scale(&|p| p.0), scale(&|p| p.1));
+    let clip = |v: f64| v.clamp(-3.0, 3.0);
+    let (mut xy, mut xx, mut yy) = (0.0, 0.0, 0.0);
+    for p in pairs {
+        let (x, y) = (clip(p.0 / a), clip(p.1 / b));
+        xy += x * y;
+        xx += x * x;
+        yy += y * y;
+    }
+    xy / (xx * yy).sqrt().max(1e-12)
 }

@@ -21,7 +21,7 @@ pub(crate) const HOLD: usize = TIRES;
 pub(crate) const BASE: usize = TIRES + 1;
 
 /// Time before a window from which the steering is followed.
-const RUN_IN_S: f64 = 1.0;
+const RUN_IN_S: f64 = 0.6;
 
 /// The model with a list of effects, on a recording.
 #[derive(Debug, Clone)]
@@ -77,7 +77,8 @@ impl<'a> ExtendedModel<'a> {
         &p[BASE + self.effects.iter().map(|e| e.spec().parameters.len()).sum::<usize>()..]
     }
 
-    fn road_wheel_angles<T: Real>(&self, p: &[T], window: &Window) -> Vec<T> {
+    /// Road-wheel angles from some time before the window on, and how many samples lie before it.
+    fn road_wheel_angles<T: Real>(&self, p: &[T], window: &Window) -> (Vec<T>, usize) {
         let run = &self.recording.runs[window.segment];
         let run_in = ((RUN_IN_S / run.dt_s).ceil() as usize).min(window.from);
         // One sample more than the window: delays interpolate with both neighbours.
@@ -88,11 +89,13 @@ impl<'a> ExtendedModel<'a> {
         for (effect, values) in self.with_parameters(p) {
             effect.steer(values, &mut series, run.dt_s);
         }
-        series.split_off(run_in)
+        (series, run_in)
     }
 
-    fn flatten<T: Real>(&self, outputs: &Outputs<T>, out: &mut Vec<T>) {
+    fn flatten<T: Real>(&self, outputs: &Outputs<T>, window: &Window, out: &mut Vec<T>) {
         let n = outputs.v_y_mps.len();
+        let kinematic = self.kinematic(outputs, window);
+        let derived: Vec<T> = if self.recording.derived_a_y { self.derived_a_y(outputs, window) } else { Vec::new() };
         let series: Vec<(&[T], T)> = self
             .recording
             .channels
@@ -101,10 +104,12 @@ impl<'a> ExtendedModel<'a> {
                 let values: &[T] = match c {
                     Channel::LateralVelocity => &outputs.v_y_mps,
                     Channel::YawRate | Channel::Gyro => &outputs.yaw_rate_radps,
+                    Channel::LateralAcceleration if self.recording.derived_a_y => &derived,
                     Channel::LateralAcceleration => &outputs.a_y_mps2,
                     Channel::Heading => &outputs.heading_rad,
                     Channel::LongitudinalAcceleration => &outputs.a_x_mps2,
                     Channel::Speed => &outputs.v_x_mps,
+                    Channel::LateralKinematics => &kinematic,
                 };
                 let mean = if c.without_mean() {
                     values.iter().fold(T::from(0.0), |s, v| s + *v) / n as f64
@@ -120,6 +125,37 @@ impl<'a> ExtendedModel<'a> {
         }
     }
 
+    /// The kinematic channel of the signals as predicted.
+    fn kinematic<T: Real>(&self, out: &Outputs<T>, window: &Window) -> Vec<T> {
+        if !self.recording.channels.contains(&Channel::LateralKinematics) {
+            return Vec::new();
+        }
+        let v_x = &self.recording.runs[window.segment].v_x_mps[window.from..];
+        let rate = |k: usize| out.a_y_mps2[k] - out.yaw_rate_radps[k] * v_x[k];
+        let mut integral = T::from(0.0);
+        (0..out.v_y_mps.len())
+            .map(|k| {
+                if k > 0 {
+                    integral += (rate(k) + rate(k - 1)) * (0.5 * out.dt_s);
+                }
+                out.v_y_mps[k] - integral
+            })
+            .collect()
+    }
+
+    /// The lateral acceleration as whoever recorded it made it: from the reported v_y, v_x and r.
+    fn derived_a_y<T: Real>(&self, out: &Outputs<T>, window: &Window) -> Vec<T> {
+        let v_x = &self.recording.runs[window.segment].v_x_mps[window.from..];
+        let n = out.v_y_mps.len();
+        (0..n)
+            .map(|k| {
+                let (a, b) = (k.saturating_sub(1), (k + 1).min(n - 1));
+                let slope = (out.v_y_mps[b] - out.v_y_mps[a]) / ((b - a).max(1) as f64 * out.dt_s);
+                slope + out.yaw_rate_radps[k] * v_x[k]
+            })
+            .collect()
+    }
+
     /// The motion over a window, as recorded by its sensors.
     pub(crate) fn predict<T: Real>(&self, p: &[T], start: [T; 2], window: &Window) -> Outputs<T> {
         let tires = tires_from_parameters(&p[..TIRES]);
@@ -127,8 +163,9 @@ impl<'a> ExtendedModel<'a> {
         for (effect, values) in self.with_parameters(p) {
             effect.car(values, &mut car);
         }
-        let steering = self.road_wheel_angles(p, window);
-        let mover = Mover { model: self, p, car, tires, steering: &steering, window };
+        let (steering, run_in) = self.road_wheel_angles(p, window);
+        let (before, steering) = steering.split_at(run_in);
+        let mover = Mover { model: self, p, car, tires, before, steering, window };
         let mut outputs = mover.run(start);
         let shift = car.cog_shift_m;
         for k in 0..outputs.v_y_mps.len() {
@@ -154,7 +191,7 @@ impl Rollout for ExtendedModel<'_> {
 
     fn rollout<T: Real>(&self, parameters: &[T], start: [T; 2], window: &Window, out: &mut Vec<T>) {
         let outputs = self.predict(parameters, start, window);
-        self.flatten(&outputs, out);
+        self.flatten(&outputs, window, out);
     }
 
     fn measured(&self, window: &Window, out: &mut Vec<f64>) {

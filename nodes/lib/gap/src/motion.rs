@@ -21,6 +21,9 @@ pub(crate) struct Mover<'m, 'a, T> {
     pub(crate) p: &'m [T],
     pub(crate) car: Car<T>,
     pub(crate) tires: PacejkaParameters<T>,
+    /// Road-wheel angles before the window, up to its start.
+    pub(crate) before: &'m [T],
+    /// Road-wheel angles in the window.
     pub(crate) steering: &'m [T],
     pub(crate) window: &'m Window,
 }
@@ -115,29 +118,50 @@ impl<T: Real> Mover<'_, '_, T> {
             steady_rad: [zero; 2],
         };
         // Without relaxation the slip is the steady one whatever the memory holds; the front use settles in three turns.
-        let relaxed = self.car.relaxation_m;
         let still = Car { relaxation_m: zero, ..self.car };
         let mut rates = self.rates_of(&still, x, &now, &memory, h_s);
         for _ in 0..2 {
             memory.front_use = rates.memory.front_use;
             rates = self.rates_of(&still, x, &now, &memory, h_s);
         }
-        if relaxed.re() == 0.0 && !self.model.effects.contains(&EffectId::TireRelaxation) {
+        if !self.model.effects.contains(&EffectId::TireRelaxation) {
             return rates;
         }
-        for _ in 0..2 {
-            let next = [x[0] + rates.v_y_mps2 * h_s, x[1] + rates.yaw_radps2 * h_s];
-            let end = self.instant(0, (h_s / self.model.recording.runs[self.window.segment].dt_s).min(1.0));
-            let ahead = self.rates_of(&still, next, &end, &rates.memory, h_s);
-            // As if the slip had been a ramp for long: it lags by one relaxation time.
-            memory = rates.memory;
-            for i in 0..2 {
-                let ramp = (ahead.memory.steady_rad[i] - memory.steady_rad[i]) / h_s;
-                memory.slip_rad[i] = memory.steady_rad[i] - ramp * relaxed / now.v_x_mps;
-            }
-            rates = self.rates_of(&self.car, x, &now, &memory, 0.0);
+        memory = rates.memory;
+        let behind = self.slip_behind();
+        for i in 0..2 {
+            memory.slip_rad[i] = memory.steady_rad[i] + behind[i];
         }
-        rates
+        self.rates_of(&self.car, x, &now, &memory, 0.0)
+    }
+
+    /// How far the relaxed slip angles lie from the steady ones when the window starts: the filter run over the measured motion before it.
+    /// Offsets of the measurement cancel.
+    fn slip_behind(&self) -> [T; 2] {
+        let run = &self.model.recording.runs[self.window.segment];
+        let start = self.window.from;
+        let zero = T::from(0.0);
+        let mut steady = [zero; 2];
+        let mut slip = [zero; 2];
+        let count = self.before.len();
+        for (i, &steering_rad) in self.before.iter().chain(self.steering.first()).enumerate() {
+            let k = start + i - count;
+            let v_x = self.car.speed_factor * run.v_x_mps[k].max(MIN_SPEED_MPS);
+            let (v_y, r) = (run.smooth[0][k], run.smooth[1][k]);
+            let now = [
+                steering_rad - ((self.car.l_f_m * r + v_y) / v_x).atan(),
+                -((-(self.car.l_r_m * r) + v_y) / v_x).atan(),
+            ];
+            for axle in 0..2 {
+                slip[axle] = if i == 0 {
+                    now[axle]
+                } else {
+                    lagged(slip[axle], steady[axle], now[axle], run.dt_s, self.car.relaxation_m / v_x)
+                };
+            }
+            steady = now;
+        }
+        [slip[0] - steady[0], slip[1] - steady[1]]
     }
 
     fn instant(&self, k: usize, share: f64) -> Instant<T> {

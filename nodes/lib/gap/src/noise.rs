@@ -18,16 +18,21 @@ const LEAST_SHARE: f64 = 2e-3;
 
 /// Standard deviation of the noise of channel `c`.
 pub(crate) fn sigma(runs: &[Run], c: usize) -> f64 {
+    let noise = of(runs.iter().map(|r| r.measured[c].as_slice()));
+    noise.max(LEAST_SHARE * spread(runs, c, true)).max(1e-6)
+}
+
+/// Standard deviation of the noise of a series in stretches.
+pub(crate) fn of<'a>(stretches: impl Iterator<Item = &'a [f64]>) -> f64 {
     let mut sizes = Vec::new();
-    for run in runs {
-        let mut d = run.measured[c].clone();
+    for stretch in stretches {
+        let mut d = stretch.to_vec();
         for _ in 0..ORDER {
             d = d.windows(2).map(|w| w[1] - w[0]).collect();
         }
         sizes.extend(d.iter().map(|v| v.abs()));
     }
-    let noise = median(sizes) / MEDIAN_OF_NORMAL / GAIN.sqrt();
-    noise.max(LEAST_SHARE * spread(runs, c, true)).max(1e-6)
+    median(sizes) / MEDIAN_OF_NORMAL / GAIN.sqrt()
 }
 
 /// Time over which a channel that counts without its mean is looked at.
@@ -71,6 +76,7 @@ mod tests {
             a_x_mps2: vec![0.0; n],
             force_x_mps2: vec![0.0; n],
             lap_share: vec![0.0; n],
+            smooth: [vec![0.0; n], vec![0.0; n]],
             measured: vec![signal],
         };
         approx::assert_relative_eq!(sigma(&[run], 0), 0.02, max_relative = 0.05);

@@ -30,12 +30,13 @@ pub fn probe(rec: &Recording, veh: &VehicleParameters, tires: Option<PacejkaPara
     if let Ok(names) = std::env::var("TRY") {
         for list in names.split(',') {
             let effects: Vec<EffectId> = list.split('+').map(|n| EffectId::by_name(n).unwrap()).collect();
-            for mult in [0.3, 1.0, 2.0] {
+            for mult in [1.0] {
                 let t1 = std::time::Instant::now();
                 let mut v = null.parameters.clone(); let base = v.len();
                 for ef in &effects { for p in ef.spec().parameters { v.push(p.null + mult * e.size(p)); } }
                 let f = e.fit(&effects, &v, Some(null.starts.clone()), &sp.training, 30);
                 eprintln!("  {list:28} x{mult} dcost {:10.1} p {:?} tires {:?} [{:.0?} it {} {:?}] {:?}", null.cost - f.cost, &f.parameters[base..], &f.parameters[..base], t1.elapsed(), f.fit.as_ref().unwrap().iterations, f.fit.as_ref().unwrap().stop, crate::select::channel_excess(&e,&f,&sp.training));
+                if std::env::var("W").is_ok() { for (i,w) in sp.training.windows.iter().enumerate() { let r=&rec.runs[w.segment]; eprintln!("   w t {:.1} v {:.1} ax {:.1} ay {:.1} null {:.0} now {:.0}", r.time_s(w.from), r.v_x_mps[w.from], r.a_x_mps2[w.from], r.v_x_mps[w.from]*r.measured[1][w.from], null.window_costs[i], f.window_costs[i]); } }
             }
         }
     }

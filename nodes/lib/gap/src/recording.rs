@@ -23,11 +23,14 @@ pub enum Channel {
     LongitudinalAcceleration,
     /// Forward speed, less its mean over a window, with a longitudinal command.
     Speed,
+    /// v_y less the integral of a_y - v_x r, less its mean: zero for any tire where the sensors and the road are as assumed. Fitted, not
+    /// scored: it repeats what other channels hold, without the tires' errors.
+    LateralKinematics,
 }
 
 impl Channel {
     /// Every channel.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::LateralVelocity,
         Self::YawRate,
         Self::LateralAcceleration,
@@ -35,6 +38,7 @@ impl Channel {
         Self::Heading,
         Self::LongitudinalAcceleration,
         Self::Speed,
+        Self::LateralKinematics,
     ];
 
     /// Name with unit.
@@ -48,12 +52,18 @@ impl Channel {
             Self::Heading => "heading_rad",
             Self::LongitudinalAcceleration => "a_x_mps2",
             Self::Speed => "v_x_mps",
+            Self::LateralKinematics => "v_y_kinematic_mps",
         }
     }
 
     /// Whether only its course over a window counts, not its level.
     pub(crate) fn without_mean(self) -> bool {
-        matches!(self, Self::Heading | Self::Speed)
+        matches!(self, Self::Heading | Self::Speed | Self::LateralKinematics)
+    }
+
+    /// Whether errors in it count where models are scored.
+    pub(crate) fn scored(self) -> bool {
+        self != Self::LateralKinematics
     }
 }
 
@@ -67,6 +77,8 @@ pub(crate) struct Run {
     pub(crate) a_x_mps2: Vec<f64>,
     pub(crate) force_x_mps2: Vec<f64>,
     pub(crate) lap_share: Vec<f64>,
+    /// Lateral velocity and yaw rate, smoothed: what slips were before a window starts.
+    pub(crate) smooth: [Vec<f64>; 2],
     /// Measured signals by channel, in the order of [`Recording::channels`].
     pub(crate) measured: Vec<Vec<f64>>,
 }
@@ -91,6 +103,8 @@ pub struct Recording {
     pub(crate) weights: Vec<f64>,
     pub(crate) laps: Laps,
     pub(crate) has_command: bool,
+    /// Whether the lateral acceleration was computed from v_y, v_x and r instead of measured.
+    pub(crate) derived_a_y: bool,
     pub(crate) recorded_s: f64,
     pub(crate) least_speed_mps: f64,
     pub(crate) identities: Vec<crate::Identity>,
@@ -129,12 +143,17 @@ impl Recording {
         let runs: Vec<Run> =
             parts.iter().zip(&laps.share).map(|(s, share)| run(s, share, &channels)).collect();
         let sigma: Vec<f64> = (0..channels.len()).map(|c| crate::noise::sigma(&runs, c)).collect();
-        let weights = sigma
+        let sigma: Vec<f64> = (0..channels.len())
+            .map(|c| if channels[c].scored() { sigma[c] } else { f64::INFINITY })
+            .collect();
+        let weights: Vec<f64> = sigma
             .iter()
             .enumerate()
             .map(|(c, s)| s.hypot(MODEL_SHARE * crate::noise::spread(&runs, c, channels[c].without_mean())))
             .collect();
-        Ok(Self { runs, channels, sigma, weights, laps, has_command, recorded_s, least_speed_mps, identities })
+        let weights = with_kinematic_weight(&channels, weights, &runs, &sigma);
+        let derived_a_y = identities.iter().any(|i| i.name == crate::identities::LATERAL && !i.informative);
+        Ok(Self { runs, channels, sigma, weights, laps, has_command, derived_a_y, recorded_s, least_speed_mps, identities })
     }
 
     /// The channels that are explained.
@@ -173,6 +192,7 @@ fn channels(segment: &Segment, has_command: bool, identities: &[crate::Identity]
         Channel::Heading => !segment.yaw_rad.is_empty() && independent(crate::identities::HEADING),
         Channel::LongitudinalAcceleration => has_command && !segment.a_x_mps2.is_empty(),
         Channel::Speed => has_command,
+        Channel::LateralKinematics => !segment.a_y_mps2.is_empty() && independent(crate::identities::LATERAL),
     };
     Channel::ALL.into_iter().filter(|&c| has(c)).collect()
 }
@@ -208,6 +228,7 @@ fn run(s: &Segment, lap_share: &[f64], channels: &[Channel]) -> Run {
             Channel::Heading => s.yaw_rad.clone(),
             Channel::LongitudinalAcceleration => s.a_x_mps2.clone(),
             Channel::Speed => s.v_x_mps.clone(),
+            Channel::LateralKinematics => kinematic(&v_x_mps, s),
         })
         .collect();
     Run {
@@ -218,6 +239,35 @@ fn run(s: &Segment, lap_share: &[f64], channels: &[Channel]) -> Run {
         a_x_mps2,
         force_x_mps2,
         lap_share: lap_share.to_vec(),
+        smooth: [&s.v_y_mps, &s.yaw_rate_radps].map(|c| local_quadratic(c, half, s.dt_s).0),
         measured,
     }
+}
+
+/// v_y less the integral of a_y - v_x r.
+fn kinematic(v_x_mps: &[f64], s: &Segment) -> Vec<f64> {
+    let rate = |k: usize| s.a_y_mps2[k] - v_x_mps[k] * s.yaw_rate_radps[k];
+    let mut integral = 0.0;
+    (0..s.len())
+        .map(|k| {
+            if k > 0 {
+                integral += 0.5 * (rate(k) + rate(k - 1)) * s.dt_s;
+            }
+            s.v_y_mps[k] - integral
+        })
+        .collect()
+}
+
+/// The kinematic channel's weight from the noise of what it is made of, integrated over half a window.
+fn with_kinematic_weight(channels: &[Channel], mut weights: Vec<f64>, runs: &[Run], sigma: &[f64]) -> Vec<f64> {
+    let of = |channel| channels.iter().position(|&c| c == channel).map_or(0.0, |c| sigma[c]);
+    if let Some(place) = channels.iter().position(|&c| c == Channel::LateralKinematics) {
+        let v_x = median(runs.iter().flat_map(|r| r.v_x_mps.iter().copied()).collect());
+        let dt_s = runs.first().map_or(0.01, |r| r.dt_s);
+        let walk = (dt_s * crate::windows::WINDOW_S / 4.0).sqrt();
+        let rate = of(Channel::LateralAcceleration).hypot(v_x * of(Channel::YawRate));
+        let noise = of(Channel::LateralVelocity).hypot(rate * walk);
+        weights[place] = noise.hypot(MODEL_SHARE * crate::noise::spread(runs, 0, true));
+    }
+    weights
 }

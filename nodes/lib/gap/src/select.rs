@@ -1,9 +1,59 @@
-//! Which effects: joint refits of the best candidates, one effect after the other.
+//! Which effects: joint refits of the best candidates, one effect after the other, each judged by what it closes of what remains.
+
 use gripsight_identification::shooting::Rollout;
 
+use crate::effects::EffectId;
 use crate::engine::{Engine, State};
+use crate::screen::{Screened, Screening, screen};
 use crate::smooth::median;
 use crate::windows::Windows;
+
+/// Thresholds of the decisions. Fixed on development cases of the reference car (seeds below 1000); see `tests/results/gap`.
+pub(crate) mod thresholds {
+    /// Candidates refitted in the first round, and in later rounds.
+    pub(crate) const REFITS: [usize; 2] = [9, 6];
+    /// Effects taken at most.
+    pub(crate) const MOST_EFFECTS: usize = 4;
+    /// Share of the remaining weighted cost that a first and a later effect must close.
+    pub(crate) const LEAST_SHARE: [f64; 2] = [0.10, 0.12];
+    /// How sure it must be that a candidate beats the current model, in standard deviations over blocks.
+    pub(crate) const LEAST_Z: f64 = 3.0;
+    /// Smallest effect that is named, over the size that matters.
+    pub(crate) const LEAST_SIZE: f64 = 0.35;
+    /// Candidates whose refits cannot be told apart by this many standard deviations are confused.
+    pub(crate) const CONFUSED_Z: f64 = 1.64;
+    /// Candidates whose signatures are this parallel are confused.
+    pub(crate) const CONFUSED_COSINE: f64 = 0.97;
+    /// A candidate this near to the best one's cost, in shares of the best one's gain, counts as near.
+    pub(crate) const NEAR_SHARE: f64 = 0.05;
+}
+
+/// A candidate, refitted.
+#[derive(Debug, Clone)]
+pub(crate) struct Refit {
+    pub(crate) effect: EffectId,
+    pub(crate) state: State,
+    /// Drop of the cost against the model without it.
+    pub(crate) gain: f64,
+    /// The same over its standard deviation between blocks.
+    pub(crate) z: f64,
+    /// Size over the size that matters.
+    pub(crate) relative_size: f64,
+}
+
+/// One round of the search.
+#[derive(Debug, Clone)]
+pub(crate) struct Round {
+    /// Refitted candidates, best first.
+    pub(crate) refits: Vec<Refit>,
+    /// Chance that the best beats each of the others, in standard deviations.
+    pub(crate) lead_z: Vec<f64>,
+    pub(crate) screening: Screening,
+    /// The place of the effect taken, if one was.
+    pub(crate) taken: Option<usize>,
+    /// The model before it.
+    pub(crate) before: State,
+}
 
 /// Mean square of each channel's residuals over the noise variance: median over windows.
 pub(crate) fn channel_excess(engine: &Engine<'_>, state: &State, windows: &Windows) -> Vec<f64> {
@@ -36,6 +86,198 @@ pub(crate) fn reweigh(engine: &mut Engine<'_>, state: &State, windows: &Windows)
         .weights
         .iter()
         .zip(recording.sigma.iter().zip(excess))
-        .map(|(weight, (noise, e))| weight.max(noise * (1.0 + MISFIT_SHARE * (e - 1.0).max(0.0)).sqrt()))
+        .map(|(&weight, (noise, e))| {
+            if noise.is_finite() { weight.max(noise * (1.0 + MISFIT_SHARE * (e - 1.0).max(0.0)).sqrt()) } else { weight }
+        })
         .collect();
+}
+
+/// Sum over blocks of the differences of two models' window costs, and its standard deviation between blocks.
+pub(crate) fn difference(windows: &Windows, a: &State, b: &State) -> (f64, f64) {
+    let mut blocks: Vec<(usize, f64)> = Vec::new();
+    for (k, &block) in windows.block.iter().enumerate() {
+        let d = a.window_costs[k] - b.window_costs[k];
+        match blocks.last_mut().filter(|l| l.0 == block) {
+            Some(last) => last.1 += d,
+            None => blocks.push((block, d)),
+        }
+    }
+    let n = blocks.len() as f64;
+    let sum: f64 = blocks.iter().map(|b| b.1).sum();
+    let mean = sum / n.max(1.0);
+    let variance = blocks.iter().map(|b| (b.1 - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    // A difference can hardly be surer than its own noise: a cost difference of d has at least the variance 4 d of chi-squares.
+    (sum, (variance * n + 4.0 * sum.abs()).sqrt().max(1e-9))
+}
+
+/// Refits one candidate on top of a state: from the linear step, and from its own starts; the best counts.
+fn refit(engine: &Engine<'_>, state: &State, screened: &Screened, windows: &Windows, extra: &[Vec<f64>]) -> Refit {
+    const FIRST: usize = 3;
+    const REST: usize = 6;
+    let effect = screened.effect;
+    let spec = effect.spec();
+    let clamp = |values: Vec<f64>| -> Vec<f64> {
+        values
+            .into_iter()
+            .zip(spec.parameters)
+            .map(|(v, p)| {
+                let size = engine.size(p);
+                v.clamp(p.null + p.range[0] * size, p.null + p.range[1] * size)
+            })
+            .collect()
+    };
+    let mut starts: Vec<Vec<f64>> = extra.to_vec();
+    if !spec.flat_at_null {
+        starts.push(clamp(spec.parameters.iter().zip(&screened.step).map(|(p, s)| p.null + s).collect()));
+    }
+    if extra.is_empty() {
+        for m in spec.starts.iter().filter(|m| **m != 0.0) {
+            starts.push(clamp(spec.parameters.iter().map(|p| p.null + m * engine.size(p)).collect()));
+        }
+    }
+    let mut effects = state.effects.clone();
+    effects.push(effect);
+    let attempt = |values: &[f64], starts: &[[f64; 2]], steps: usize| {
+        engine.fit(&effects, values, Some(starts.to_vec()), windows, steps)
+    };
+    let best = starts
+        .iter()
+        .map(|own| {
+            let mut values = state.parameters.clone();
+            values.extend(own);
+            attempt(&values, &state.starts, FIRST)
+        })
+        .filter(|s| s.finite)
+        .min_by(|a, b| a.cost.total_cmp(&b.cost));
+    let done = match best {
+        Some(best) => attempt(&best.parameters, &best.starts, REST),
+        None => state.clone(),
+    };
+    let (gain, deviation) =
+        if done.effects.len() == effects.len() { difference(windows, state, &done) } else { (0.0, 1.0) };
+    let own = done.of(effect).unwrap_or(&[]);
+    let relative_size = relative_size(engine, effect, own);
+    Refit { effect, gain, z: gain / deviation, relative_size, state: done }
+}
+
+/// The largest parameter over its size; of effects whose later parameters only place them, the first.
+pub(crate) fn relative_size(engine: &Engine<'_>, effect: EffectId, own: &[f64]) -> f64 {
+    let sizing = if effect == EffectId::LowGripPatch { 1 } else { own.len() };
+    own.iter()
+        .zip(effect.spec().parameters)
+        .take(sizing)
+        .map(|(v, p)| ((v - p.null) / engine.size(p)).abs())
+        .fold(0.0, f64::max)
+}
+
+/// Starts of a patch: the places of the lap where more grip than elsewhere is missing.
+fn patch_starts(engine: &Engine<'_>, state: &State, windows: &Windows) -> Vec<Vec<f64>> {
+    const PLACES: usize = 12;
+    let spec = EffectId::LowGripPatch.spec();
+    let length = 0.6 / PLACES as f64 * 1.5;
+    let mut effects = state.effects.clone();
+    effects.push(EffectId::LowGripPatch);
+    let mut found: Vec<(f64, f64)> = (0..PLACES)
+        .map(|i| {
+            let start = i as f64 / PLACES as f64;
+            let mut values = state.parameters.clone();
+            values.extend([0.0, start, length]);
+            let here = engine.linearize(&effects, &values, &state.starts, windows);
+            let parameters = engine.parameters(&effects, &values, 1.0);
+            let free: Vec<usize> = (0..values.len()).filter(|&j| parameters[j].free).collect();
+            let row = free.iter().position(|&j| j == state.parameters.len());
+            let gain = row.map_or(0.0, |r| {
+                let g = here.gradient[r];
+                if g < 0.0 { g * g / here.information[(r, r)].max(1e-9) } else { 0.0 }
+            });
+            (gain, start)
+        })
+        .collect();
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let depth = engine.size(&spec.parameters[0]);
+    found.iter().take(2).map(|&(_, start)| vec![depth, start, length]).collect()
+}
+
+/// One round: screens, refits the best, and says whether one is taken.
+pub(crate) fn round(
+    engine: &Engine<'_>,
+    state: &State,
+    candidates: &[EffectId],
+    windows: &Windows,
+    number: usize,
+) -> Round {
+    let left: Vec<EffectId> = candidates.iter().copied().filter(|e| !state.effects.contains(e)).collect();
+    let visible: Vec<EffectId> = left.iter().copied().filter(|e| !e.spec().flat_at_null).collect();
+    let screening = screen(engine, state, &visible, windows);
+    let mut order: Vec<&Screened> = screening.candidates.iter().collect();
+    order.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let count = thresholds::REFITS[number.min(1)];
+    let mut refits: Vec<Refit> =
+        order.into_iter().take(count).map(|s| refit(engine, state, s, windows, &[])).collect();
+    for &effect in left.iter().filter(|e| e.spec().flat_at_null) {
+        let n = effect.spec().parameters.len();
+        let blank = Screened { effect, gain: 0.0, step: vec![0.0; n], error: vec![f64::INFINITY; n] };
+        let extra =
+            if effect == EffectId::LowGripPatch { patch_starts(engine, state, windows) } else { Vec::new() };
+        refits.push(refit(engine, state, &blank, windows, &extra));
+    }
+    refits.sort_by(|a, b| score(b).total_cmp(&score(a)));
+    prefer_simple(&mut refits);
+    let mut before = state.clone();
+    if let Some(best) = refits.first() {
+        // The model without the effect may have been stuck where the winner is not.
+        let own = state.parameters.len();
+        let again =
+            engine.fit(&state.effects, &best.state.parameters[..own], Some(best.state.starts.clone()), windows, 10);
+        if again.finite && again.cost < before.cost {
+            before = again;
+        }
+    }
+    for r in &mut refits {
+        let (gain, deviation) = difference(windows, &before, &r.state);
+        r.gain = gain;
+        r.z = gain / deviation;
+    }
+    let lead_z = refits
+        .iter()
+        .map(|r| {
+            let (d, deviation) = difference(windows, &r.state, &refits[0].state);
+            d / deviation
+        })
+        .collect();
+    let taken = refits
+        .iter()
+        .take(1)
+        .position(|r| acceptable(r, &before, number));
+    Round { refits, lead_z, screening, taken, before }
+}
+
+/// What candidates are ranked by: the drop of the cost, less a price for every parameter.
+fn score(r: &Refit) -> f64 {
+    const PRICE: f64 = 6.0;
+    r.gain - PRICE * r.effect.spec().parameters.len() as f64
+}
+
+/// Of near equals the one with fewer parameters wins.
+fn prefer_simple(refits: &mut [Refit]) {
+    let Some(best) = refits.first().map(score) else { return };
+    let near = |r: &Refit| score(r) > best - thresholds::NEAR_SHARE * 0.4 * best.max(0.0);
+    let count = |r: &Refit| r.effect.spec().parameters.len();
+    if let Some(place) = (1..refits.len())
+        .filter(|&i| near(&refits[i]) && count(&refits[i]) < count(&refits[0]))
+        .min_by_key(|&i| (count(&refits[i]), i))
+    {
+        refits[..=place].rotate_right(1);
+    }
+}
+
+/// Whether the best candidate is real, big enough to matter, and closes enough of what remains.
+fn acceptable(r: &Refit, before: &State, number: usize) -> bool {
+    let dof = before.fit.as_ref().map_or(1.0, |f| f.linearization.residuals as f64);
+    // What the weighted cost would be without any gap is unknown; half the residuals is a low guess, as weights hold a share of the misfit.
+    let remaining = (before.cost - 0.3 * dof).max(0.1 * before.cost);
+    let share = r.gain / remaining.max(1e-9);
+    r.z > thresholds::LEAST_Z
+        && share > thresholds::LEAST_SHARE[number.min(1)]
+        && r.relative_size > thresholds::LEAST_SIZE
 }

@@ -26,6 +26,17 @@ pub(crate) struct Windows {
 }
 
 impl Windows {
+    /// At most about so many windows, in whole blocks spread over the recording.
+    pub(crate) fn thinned(&self, most: usize) -> Self {
+        let every = self.windows.len().div_ceil(most.max(1)).max(1);
+        let mut numbers = self.block.clone();
+        numbers.dedup();
+        let kept = |block: &usize| numbers.iter().position(|b| b == block).is_some_and(|i| i % every == 0);
+        let (windows, block) =
+            self.windows.iter().zip(&self.block).filter(|(_, b)| kept(b)).map(|(w, b)| (*w, *b)).unzip();
+        Self { windows, block }
+    }
+
     /// Time covered.
     pub(crate) fn duration_s(&self, dt_s: f64) -> f64 {
         self.windows.iter().map(|w| w.len as f64 * dt_s).sum()

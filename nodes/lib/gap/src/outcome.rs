@@ -1,0 +1,211 @@
+//! The result of a diagnosis: gap.json, and the series that pictures are drawn from.
+
+use std::collections::BTreeMap;
+
+use gripsight_signals::DataHealth;
+use gripsight_vehicle::PacejkaParameters;
+use serde::Serialize;
+
+use crate::{Estimate, Identity};
+
+/// What a diagnosis comes to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Effects of the library explain the gap; they are named.
+    Effects,
+    /// Other tires close what gap there is.
+    TireRetuneOnly,
+    /// Model and car agree within the noise and the usual imperfection of the model.
+    NoGap,
+    /// There is a gap that no effect of the library explains.
+    NoneOfThese,
+    /// The data cannot tell.
+    NotIdentifiable,
+}
+
+impl Verdict {
+    /// As in gap.json.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Effects => "effects",
+            Self::TireRetuneOnly => "tire_retune_only",
+            Self::NoGap => "no_gap",
+            Self::NoneOfThese => "none_of_these",
+            Self::NotIdentifiable => "not_identifiable",
+        }
+    }
+}
+
+/// A parameter of an effect with its 90 % interval.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EffectParameter {
+    /// Best value.
+    pub value: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Unit; `1` for none.
+    pub unit: &'static str,
+}
+
+/// An effect in the ranking.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RankedEffect {
+    /// Canonical name.
+    pub name: &'static str,
+    /// Whether the verdict names it.
+    pub accepted: bool,
+    /// Sizes by name.
+    pub parameters: BTreeMap<&'static str, EffectParameter>,
+    /// Share of the gap between retuned tires and noise floor that it closes on held-out data, after those above it.
+    pub gap_closed_fraction: Estimate,
+    /// Stated chance that it is the cause.
+    pub confidence: f64,
+    /// Effects that this recording cannot tell from it.
+    pub confused_with: Vec<&'static str>,
+}
+
+/// An effect that these signals cannot show.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Invisible {
+    /// Canonical name.
+    pub name: &'static str,
+    /// Why.
+    pub reason: String,
+}
+
+/// Size from which an effect would show.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DetectionLimit {
+    /// Canonical name of the effect.
+    pub name: &'static str,
+    /// Parameter as it is fitted.
+    pub parameter: &'static str,
+    /// Five standard errors.
+    pub size: f64,
+}
+
+/// A part of the data with its errors.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Place {
+    /// Lower end of the bin.
+    pub low: f64,
+    /// Upper end of the bin.
+    pub high: f64,
+    /// Unit of the ends.
+    pub unit: &'static str,
+    /// Channel, or `all`.
+    pub channel: &'static str,
+    /// Squared error over the noise variance per degree of freedom.
+    pub chi2_per_dof: f64,
+    /// Share of the whole squared error.
+    pub share: f64,
+}
+
+/// Where the gap lies.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Where {
+    /// By channel.
+    pub channel: Vec<Place>,
+    /// By axle: errors of the lateral velocity of each axle.
+    pub axle: Vec<Place>,
+    /// By forward speed.
+    pub speed: Vec<Place>,
+    /// By absolute lateral acceleration.
+    pub lateral_acceleration: Vec<Place>,
+    /// By the larger absolute slip angle.
+    pub slip: Vec<Place>,
+    /// By absolute steering rate.
+    pub steering_rate: Vec<Place>,
+    /// By longitudinal acceleration.
+    pub longitudinal_acceleration: Vec<Place>,
+    /// By frequency of the error.
+    pub frequency: Vec<Place>,
+    /// By distance along the lap, in m; empty without laps.
+    pub track_position: Vec<Place>,
+    /// By time.
+    pub time: Vec<Place>,
+}
+
+/// The gap step by step: mean squared error of open-loop rollouts on held-out data over the noise variance.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GapBudget {
+    /// The model as it came.
+    pub nominal: Estimate,
+    /// With the tires retuned.
+    pub retuned: Estimate,
+    /// With the named effects.
+    pub after: Estimate,
+    /// With flexible terms on top.
+    pub unstructured_ceiling: Estimate,
+    /// What the noise alone leaves.
+    pub noise_floor: Estimate,
+    /// Length of the rollouts.
+    pub horizon_s: f64,
+    /// Weight of every channel: one over its noise.
+    pub channel_noise: BTreeMap<&'static str, f64>,
+    /// Whether the figures are from held-out blocks, from another bag, or (too little data) from the training blocks.
+    pub scored_on: &'static str,
+}
+
+/// Tires with and without the named effects.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TirePair {
+    /// Fitted without any effect.
+    pub without_effect: PacejkaParameters,
+    /// Fitted together with the named effects.
+    pub with_effect: PacejkaParameters,
+}
+
+/// Points of the pictures.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Series {
+    /// F_y/F_z over slip angle: (slip in rad, without effect, with effect), front then rear.
+    pub tire_curves: [Vec<[f64; 3]>; 2],
+    /// Largest slip angle driven, front and rear, rad.
+    pub slip_driven_rad: [f64; 2],
+    /// The five seconds with the largest errors: time, then for v_y and yaw rate (measured, nominal, after).
+    pub worst: Vec<[f64; 7]>,
+    /// Squared error per degree of freedom over speed (m/s) and lateral acceleration (m/s2): (speed, a_y, chi2).
+    pub heat: Vec<[f64; 3]>,
+    /// Longitudinal and lateral acceleration (m/s2) of the recording.
+    pub g_g: Vec<[f64; 2]>,
+    /// Rollout errors over the horizon: (horizon in s, nominal, retuned, after).
+    pub horizon: Vec<[f64; 4]>,
+}
+
+/// A diagnosis.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// What it comes to.
+    pub verdict: Verdict,
+    /// Why, in sentences.
+    pub reasons: Vec<String>,
+    /// Effects, best first; those accepted come first, in the order in which they were found.
+    pub effects: Vec<RankedEffect>,
+    /// Effects that these signals cannot show.
+    pub invisible: Vec<Invisible>,
+    /// Sizes from which effects would show.
+    pub detection_limits: Vec<DetectionLimit>,
+    /// Where the gap lies.
+    #[serde(rename = "where")]
+    pub places: Where,
+    /// The kinematic identities.
+    pub identities: Vec<Identity>,
+    /// How large it is, step by step.
+    pub gap: GapBudget,
+    /// (retuned - after)/(retuned - noise floor).
+    pub gap_closed_fraction: Estimate,
+    /// Tires with and without the effects.
+    pub tires: TirePair,
+    /// Rates, gaps, jitter, frozen channels.
+    pub data_health: DataHealth,
+    /// What to drive or record next.
+    pub drive_next: Vec<String>,
+    /// Points of the pictures.
+    #[serde(skip)]
+    pub series: Series,
+}

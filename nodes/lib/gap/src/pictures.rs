@@ -1,0 +1,128 @@
+//! The points of the report's pictures.
+
+use gripsight_identification::shooting::Rollout;
+
+use crate::engine::{Engine, Score, State};
+use crate::evaluate::{by_block, mean};
+use crate::outcome::Series;
+use crate::place::heat;
+use crate::windows::{Windows, of_length};
+
+/// Length of the overlay of the worst stretch.
+const WORST_S: f64 = 5.0;
+const HORIZONS_S: [f64; 5] = [0.1, 0.2, 0.5, 1.0, 2.0];
+
+pub(crate) fn series(
+    engine: &Engine<'_>,
+    nominal: &[f64],
+    null: &State,
+    state: &State,
+    all: &Windows,
+    nominal_score: &Score,
+    scored: &Windows,
+) -> Series {
+    let slip_driven_rad = slips(engine, null, all);
+    Series {
+        tire_curves: curves(null, state, slip_driven_rad),
+        slip_driven_rad,
+        worst: worst(engine, nominal, state, all, nominal_score),
+        heat: heat(engine, nominal, all, nominal_score),
+        g_g: g_g(engine),
+        horizon: horizon(engine, nominal, null, state, scored),
+    }
+}
+
+fn slips(engine: &Engine<'_>, null: &State, all: &Windows) -> [f64; 2] {
+    let car = gripsight_vehicle::SingleTrack::new(engine.vehicle, &null.tires());
+    let mut most = [0.0_f64; 2];
+    for w in &all.windows {
+        let run = &engine.recording.runs[w.segment];
+        for k in w.from..w.from + w.len {
+            let state = gripsight_vehicle::State { v_y_mps: run.smooth[0][k], yaw_rate_radps: run.smooth[1][k] };
+            let input = gripsight_vehicle::Input { v_x_mps: run.v_x_mps[k], steering_rad: run.steering_rad[k] };
+            let (f, r) = car.slip_angles_rad(&state, &input);
+            most = [most[0].max(f.abs()), most[1].max(r.abs())];
+        }
+    }
+    most
+}
+
+fn curves(null: &State, state: &State, driven_rad: [f64; 2]) -> [Vec<[f64; 3]>; 2] {
+    const POINTS: usize = 60;
+    let (without, with) = (null.tires(), state.tires());
+    let axle = |a: &gripsight_vehicle::MagicFormula, b: &gripsight_vehicle::MagicFormula, most: f64| {
+        (0..=POINTS)
+            .map(|k| {
+                let slip = 1.5 * most.max(0.02) * k as f64 / POINTS as f64;
+                [slip, a.normalized_force(slip), b.normalized_force(slip)]
+            })
+            .collect()
+    };
+    [axle(&without.front, &with.front, driven_rad[0]), axle(&without.rear, &with.rear, driven_rad[1])]
+}
+
+/// The stretch of windows with the largest errors of the nominal model.
+fn worst(engine: &Engine<'_>, nominal: &[f64], state: &State, all: &Windows, score: &Score) -> Vec<[f64; 7]> {
+    let dt_s = engine.recording.dt_s();
+    let Some(first) = all.windows.first() else { return Vec::new() };
+    let count = ((WORST_S / (first.len as f64 * dt_s)).round() as usize).clamp(1, all.windows.len());
+    let best = (0..=all.windows.len() - count)
+        .max_by(|&a, &b| {
+            let sum = |i: usize| score.squares[i..i + count].iter().sum::<f64>();
+            sum(a).total_cmp(&sum(b))
+        })
+        .unwrap_or(0);
+    let chosen = Windows {
+        windows: all.windows[best..best + count].to_vec(),
+        block: all.block[best..best + count].to_vec(),
+    };
+    let runs = [(&[][..], nominal), (&state.effects[..], &state.parameters[..])].map(|(effects, p)| {
+        let fitted = engine.score(effects, None, p, &chosen);
+        let model = engine.model(effects, None);
+        let mut out = Vec::new();
+        for (w, start) in chosen.windows.iter().zip(&fitted.starts) {
+            let mut predicted = Vec::new();
+            model.rollout(p, *start, w, &mut predicted);
+            let channels = model.channels();
+            out.extend(predicted.chunks(channels).map(|row| [row[0], row[1]]));
+        }
+        out
+    });
+    let mut out = Vec::new();
+    for w in &chosen.windows {
+        let run = &engine.recording.runs[w.segment];
+        for k in w.from..w.from + w.len {
+            let i = out.len();
+            let (Some(a), Some(b)) = (runs[0].get(i), runs[1].get(i)) else { return out };
+            out.push([run.time_s(k), run.measured[0][k], a[0], b[0], run.measured[1][k], a[1], b[1]]);
+        }
+    }
+    out
+}
+
+fn g_g(engine: &Engine<'_>) -> Vec<[f64; 2]> {
+    const POINTS: usize = 1500;
+    let all: Vec<[f64; 2]> = engine
+        .recording
+        .runs
+        .iter()
+        .flat_map(|r| (0..r.len()).map(|k| [r.a_x_mps2[k], r.v_x_mps[k] * r.smooth[1][k]]))
+        .collect();
+    all.iter().step_by((all.len() / POINTS).max(1)).copied().collect()
+}
+
+fn horizon(engine: &Engine<'_>, nominal: &[f64], null: &State, state: &State, on: &Windows) -> Vec<[f64; 4]> {
+    HORIZONS_S
+        .into_iter()
+        .filter_map(|h| {
+            let windows = of_length(engine.recording, on, h);
+            if windows.windows.len() < 2 {
+                return None;
+            }
+            let error = |effects: &[crate::EffectId], p: &[f64]| {
+                mean(&by_block(engine.recording, &windows, &engine.score(effects, None, p, &windows)))
+            };
+            Some([h, error(&[], nominal), error(&[], &null.parameters), error(&state.effects, &state.parameters)])
+        })
+        .collect()
+}

@@ -1,0 +1,249 @@
+//! From figures to words: verdict, ranking, confidence, what to drive next.
+
+use std::collections::BTreeMap;
+
+use crate::effects::EffectId;
+use crate::engine::State;
+use crate::evaluate::{Estimate, bootstrap, mean};
+use crate::model::BASE;
+use crate::outcome::{EffectParameter, RankedEffect, Verdict};
+use crate::select::{Round, thresholds};
+
+/// Errors of the models on the scored blocks.
+#[derive(Debug, Clone)]
+pub(crate) struct Budget {
+    pub(crate) nominal: Vec<(f64, f64)>,
+    /// Retuned tires, then with one effect after the other.
+    pub(crate) steps: Vec<Vec<(f64, f64)>>,
+    pub(crate) ceiling: Vec<(f64, f64)>,
+    pub(crate) floor: Estimate,
+    pub(crate) closed: Estimate,
+    pub(crate) scored_on: &'static str,
+}
+
+/// Excess of the retuned model over the noise below which there is no gap to explain: slow sensor noise and the background that any real car
+/// has against a single-track model.
+const SMALL_EXCESS: f64 = 1.0;
+/// Share of what could be explained at all that the named effects must explain.
+const LEAST_EXPLAINED: f64 = 0.5;
+/// Excess of the nominal over the retuned model that makes it a retune.
+const RETUNE_EXCESS: f64 = 0.1;
+
+impl Budget {
+    pub(crate) fn new(
+        nominal: Vec<(f64, f64)>,
+        steps: Vec<Vec<(f64, f64)>>,
+        ceiling: Vec<(f64, f64)>,
+        scored_on: &'static str,
+    ) -> Self {
+        // By construction of the noise's figure the floor is 1; how well that figure is known shows in nothing here but the white part.
+        let floor = Estimate { value: 1.0, low: 1.0, high: 1.0 };
+        let closed = match (steps.first(), steps.last()) {
+            (Some(first), Some(last)) if steps.len() > 1 => closed(first, last, first),
+            _ => Estimate::default(),
+        };
+        Self { nominal, steps, ceiling, floor, closed, scored_on }
+    }
+
+    fn retuned(&self) -> f64 {
+        self.steps.first().map_or(f64::NAN, |b| mean(b))
+    }
+
+    fn after(&self) -> f64 {
+        self.steps.last().map_or(f64::NAN, |b| mean(b))
+    }
+}
+
+/// (from - to)/(retuned - floor), with its interval over blocks.
+fn closed(from: &[(f64, f64)], to: &[(f64, f64)], retuned: &[(f64, f64)]) -> Estimate {
+    let at = |blocks: &[(f64, f64)], picked: &[usize]| {
+        let (s, n) = picked.iter().fold((0.0, 0.0), |(s, n), &i| (s + blocks[i].0, n + blocks[i].1));
+        s / f64::max(n, 1.0)
+    };
+    bootstrap(retuned.len(), |picked| {
+        let whole = (at(retuned, picked) - 1.0).max(1e-3);
+        (at(from, picked) - at(to, picked)) / whole
+    })
+}
+
+/// The verdict, with its reasons.
+pub(crate) fn decide(budget: &Budget, rounds: &[Round], state: &State) -> (Verdict, Vec<String>) {
+    let (nominal, retuned, after) = (mean(&budget.nominal), budget.retuned(), budget.after());
+    let ceiling = mean(&budget.ceiling).min(after);
+    let mut reasons = vec![format!(
+        "mean squared rollout error over noise: {nominal:.2} nominal, {retuned:.2} with retuned tires, {after:.2} with the effects, {ceiling:.2} with flexible terms, 1 is noise"
+    )];
+    let excess = retuned - 1.0;
+    if state.effects.is_empty() {
+        let best = rounds.first().and_then(|r| r.refits.first());
+        if excess < SMALL_EXCESS {
+            let retune = nominal - retuned > RETUNE_EXCESS;
+            reasons.push("what is left after retuning the tires is within noise and the usual imperfection of the model".to_owned());
+            return (if retune { Verdict::TireRetuneOnly } else { Verdict::NoGap }, reasons);
+        }
+        let explainable = (retuned - ceiling) / excess;
+        reasons.push(format!("flexible terms would explain {:.0} % of the gap", 100.0 * explainable));
+        if let Some(best) = best {
+            reasons.push(format!("the best effect, {}, does not explain enough of it to be named", best.effect.name()));
+        }
+        return (Verdict::NoneOfThese, reasons);
+    }
+    let possible = (retuned - ceiling).max(1e-9);
+    let explained = (retuned - after) / possible;
+    reasons.push(format!("the named effects explain {:.0} % of what could be explained", 100.0 * explained));
+    if explained < LEAST_EXPLAINED && after - 1.0 > SMALL_EXCESS {
+        reasons.push("that is too little: the cause is not, or not only, in the library".to_owned());
+        return (Verdict::NoneOfThese, reasons);
+    }
+    (Verdict::Effects, reasons)
+}
+
+/// All effects that were refitted: those taken in their order, then the rest of the first round.
+pub(crate) fn rank(rounds: &[Round], state: &State, budget: &Budget) -> Vec<RankedEffect> {
+    let mut out: Vec<RankedEffect> = Vec::new();
+    let mut step = 0;
+    for round in rounds {
+        let Some(best) = round.taken.and_then(|i| round.refits.get(i)) else { continue };
+        if !state.effects.contains(&best.effect) {
+            continue;
+        }
+        step += 1;
+        let fraction = match (budget.steps.get(step - 1), budget.steps.get(step), budget.steps.first()) {
+            (Some(from), Some(to), Some(retuned)) => closed(from, to, retuned),
+            _ => Estimate::default(),
+        };
+        let confused = confused(round);
+        out.push(RankedEffect {
+            name: best.effect.name(),
+            accepted: true,
+            parameters: parameters(state, best.effect),
+            gap_closed_fraction: fraction,
+            confidence: confidence(round, &confused),
+            confused_with: confused.iter().map(|e| e.name()).collect(),
+        });
+    }
+    let Some(last) = rounds.iter().rev().find(|r| r.taken.is_none()).or(rounds.first()) else { return out };
+    let remaining = (last.before.cost).max(1e-9);
+    for r in &last.refits {
+        if out.iter().any(|e| e.name == r.effect.name()) {
+            continue;
+        }
+        let share = (r.gain / remaining).clamp(0.0, 1.0);
+        out.push(RankedEffect {
+            name: r.effect.name(),
+            accepted: false,
+            parameters: parameters(&r.state, r.effect),
+            gap_closed_fraction: Estimate { value: share, low: share, high: share },
+            confidence: 0.0,
+            confused_with: Vec::new(),
+        });
+    }
+    out
+}
+
+/// What a round cannot tell from its winner.
+fn confused(round: &Round) -> Vec<EffectId> {
+    let Some(best) = round.refits.first() else { return Vec::new() };
+    let place = |e: EffectId| round.screening.candidates.iter().position(|c| c.effect == e);
+    round
+        .refits
+        .iter()
+        .zip(&round.lead_z)
+        .skip(1)
+        .filter(|(r, z)| {
+            let near = best.gain - r.gain < thresholds::NEAR_SHARE * best.gain;
+            let alike = match (place(best.effect), place(r.effect)) {
+                (Some(a), Some(b)) => round.screening.cosine[(a, b)] > thresholds::CONFUSED_COSINE,
+                _ => false,
+            };
+            **z < thresholds::CONFUSED_Z || (near && alike)
+        })
+        .map(|(r, _)| r.effect)
+        .collect()
+}
+
+/// Chance that the winner of a round is the cause: that it beats the model without it, and every rival outside its group.
+fn confidence(round: &Round, confused: &[EffectId]) -> f64 {
+    /// Leads are less sure than their standard deviation says: models are wrong in ways that blocks share.
+    const DOUBT: f64 = 2.5;
+    const MOST: f64 = 0.98;
+    let Some(best) = round.refits.first() else { return 0.0 };
+    let rival = round
+        .refits
+        .iter()
+        .zip(&round.lead_z)
+        .skip(1)
+        .filter(|(r, _)| !confused.contains(&r.effect))
+        .map(|(_, z)| *z)
+        .fold(f64::INFINITY, f64::min);
+    let sure = |z: f64| normal(z / DOUBT);
+    let alone = 1.0 / (1.0 + confused.len() as f64 * 0.5);
+    (sure(best.z) * if rival.is_finite() { sure(rival) } else { 1.0 } * alone).min(MOST)
+}
+
+/// Standard normal distribution function (Abramowitz and Stegun 26.2.17, error below 1e-7).
+fn normal(z: f64) -> f64 {
+    let t = 1.0 / (1.0 + 0.231_641_9 * z.abs());
+    let poly = t
+        * (0.319_381_530
+            + t * (-0.356_563_782 + t * (1.781_477_937 + t * (-1.821_255_978 + t * 1.330_274_429))));
+    let tail = (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt() * poly;
+    if z > 0.0 { 1.0 - tail } else { tail }
+}
+
+/// Parameters of an effect as reported, with 90 % intervals from the fit's covariance, robust to errors that windows share.
+fn parameters(state: &State, effect: EffectId) -> BTreeMap<&'static str, EffectParameter> {
+    let spec = effect.spec();
+    let Some(own) = state.of(effect) else { return BTreeMap::new() };
+    let mut from = BASE;
+    for e in state.effects.iter().take_while(|e| **e != effect) {
+        from += e.spec().parameters.len();
+    }
+    let errors: Vec<f64> = (0..own.len())
+        .map(|i| state.fit.as_ref().and_then(|f| f.standard_error(from + i)).unwrap_or(f64::NAN))
+        .collect();
+    if spec.reported.is_empty() {
+        return spec
+            .parameters
+            .iter()
+            .enumerate()
+            .map(|(i, r)| {
+                let half = 1.645 * errors[i];
+                let p = EffectParameter { value: own[i], low: own[i] - half, high: own[i] + half, unit: r.unit };
+                (r.name, p)
+            })
+            .collect();
+    }
+    spec.reported
+        .iter()
+        .map(|r| {
+            let value = (r.value)(own);
+            // Ends from moving each fitted parameter by its own interval.
+            let (mut low, mut high) = (value, value);
+            for i in 0..own.len() {
+                for sign in [-1.645, 1.645] {
+                    let mut moved = own.to_vec();
+                    moved[i] += sign * if errors[i].is_finite() { errors[i] } else { 0.0 };
+                    let v = (r.value)(&moved);
+                    low = low.min(v);
+                    high = high.max(v);
+                }
+            }
+            (r.name, EffectParameter { value, low, high, unit: r.unit })
+        })
+        .collect()
+}
+
+/// What would split the groups and sharpen what was not seen.
+pub(crate) fn drive_next(effects: &[RankedEffect]) -> Vec<String> {
+    let mut out = Vec::new();
+    for e in effects.iter().filter(|e| e.accepted && !e.confused_with.is_empty()) {
+        let manoeuvres: Vec<String> = std::iter::once(e.name)
+            .chain(e.confused_with.iter().copied())
+            .filter_map(EffectId::by_name)
+            .map(|id| format!("{} ({})", id.spec().excitation, id.name()))
+            .collect();
+        out.push(format!("to tell {} from {}: {}", e.name, e.confused_with.join(", "), manoeuvres.join("; ")));
+    }
+    out
+}
