@@ -91,13 +91,13 @@ def build(kind, value):
     return {bool: False, str: ""}.get(kind, 0)
 
 
-def qos(name, depth=1000):
+def qos(name):
     best_effort = name == "sensor"
     latched = name == "latched"
     return Qos(
         Policy.Reliability.BestEffort if best_effort else Policy.Reliability.Reliable(duration(seconds=1)),
         Policy.Durability.TransientLocal if latched else Policy.Durability.Volatile,
-        Policy.History.KeepLast(1 if latched else depth),
+        Policy.History.KeepLast(1) if latched else Policy.History.KeepAll,
     )
 
 

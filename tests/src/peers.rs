@@ -1,7 +1,9 @@
-//! DDS peers that share no code with the suite: CycloneDDS (Python) and Fast DDS (C++).
+//! DDS peers that share no code with the suite: CycloneDDS (Python, and C
+//! in the version of ROS 2 Jazzy) and Fast DDS (C++).
 //!
 //! Where a peer is missing its tests fail, unless `GRIPSIGHT_SKIP_PEERS=1` says that they may not count.
 
+use std::ffi::OsStr;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -54,26 +56,50 @@ pub fn cyclone() -> Found {
 
 /// The Fast DDS peer, built when its source is newer.
 pub fn fast_dds() -> Found {
-    let failed = |reason: String| format!("Fast DDS: {reason}");
-    let source = own("peers/fastdds_peer.cpp");
-    let program = program_folder().join("fastdds_peer");
+    build("fastdds_peer", "fastdds_peer.cpp", |folder, source, program| {
+        let libraries = ["-lfastrtps", "-lfastcdr"];
+        let mut compiler = Command::new("c++");
+        compiler.args(["-std=c++14", "-O1"]).args(from_to(source, program));
+        finish(compiler.args(unpacked_without_root()).args(libraries).current_dir(folder))
+    })
+}
+
+/// The peer on CycloneDDS 0.10, built when its source is newer.
+pub fn cyclone_of_jazzy() -> Found {
+    build("cyclone_peer", "cyclone_peer.c", |folder, source, program| {
+        let unpacked = own("../.deps/system/usr/bin/idlc");
+        let idlc = if unpacked.exists() { unpacked } else { "idlc".into() };
+        finish(Command::new(idlc).arg(own("peers/compressed_image.idl")).current_dir(folder))?;
+        let mut compiler = Command::new("cc");
+        compiler.args(from_to(source, program)).args(["-I.", "compressed_image.c"]);
+        finish(compiler.args(unpacked_without_root()).arg("-lddsc").current_dir(folder))
+    })
+}
+
+/// Builds a peer beside the programs under test: `compile` gets a scratch folder, source and program.
+fn build(name: &str, source: &str, compile: impl Fn(&Path, &Path, &Path) -> Result<(), String>) -> Found {
+    let failed = |reason: String| format!("{name}: {reason}");
+    let source = own("peers").join(source);
+    let folder = program_folder().join("peers").join(name);
+    std::fs::create_dir_all(&folder).map_err(|error| failed(error.to_string()))?;
+    let program = folder.join(name);
     // One test builds it, the others wait.
-    let lock = File::create(program.with_extension("lock")).map_err(|error| failed(error.to_string()))?;
+    let lock = File::create(folder.join("lock")).map_err(|error| failed(error.to_string()))?;
     lock.lock().map_err(|error| failed(error.to_string()))?;
     let changed = |path: &Path| path.metadata().and_then(|data| data.modified()).ok();
     if changed(&program) < changed(&source) {
-        let output = Command::new("c++")
-            .args(["-std=c++14", "-O1", "-o"])
-            .args([&program, &source])
-            .args(unpacked_without_root())
-            .args(["-lfastrtps", "-lfastcdr"])
-            .output()
-            .map_err(|error| failed(format!("no C++ compiler: {error}")))?;
-        if !output.status.success() {
-            return Err(failed(format!("does not build: {}", String::from_utf8_lossy(&output.stderr))));
-        }
+        compile(&folder, &source, &program).map_err(failed)?;
     }
     Ok(program)
+}
+
+fn from_to<'a>(source: &'a Path, program: &'a Path) -> [&'a OsStr; 3] {
+    [source.as_os_str(), OsStr::new("-o"), program.as_os_str()]
+}
+
+fn finish(command: &mut Command) -> Result<(), String> {
+    let output = command.output().map_err(|error| format!("{command:?}: {error}"))?;
+    if output.status.success() { Ok(()) } else { Err(String::from_utf8_lossy(&output.stderr).into_owned()) }
 }
 
 /// Compiler options for libraries that the set-up script unpacked below `.deps` for want of root.
@@ -98,8 +124,9 @@ pub fn start_cyclone(domain: &Domain, python: &Path, arguments: &[&str]) -> Proc
     process
 }
 
-/// Starts the Fast DDS peer on a topic of parameter sets and waits until its endpoint stands.
-pub fn start_fast_dds(domain: &Domain, program: &Path, topic: &str, count: u32) -> Process {
+/// Starts a peer that was built here on a topic and waits until its endpoint stands. The Fast DDS
+/// peer takes parameter sets, that on CycloneDDS 0.10 compressed pictures.
+pub fn start_built(domain: &Domain, program: &Path, topic: &str, count: u32) -> Process {
     let mut command = Command::new(program);
     command.args([topic, &count.to_string(), &PATIENCE.as_secs().to_string()]);
     let process = Process::start(domain, command);

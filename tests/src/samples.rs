@@ -1,10 +1,10 @@
 //! Messages whose every field has a value of its own.
 
 use gripsight_msgs::standard::builtin_interfaces::Time;
+use gripsight_msgs::standard::sensor_msgs::CompressedImage;
 use gripsight_msgs::standard::std_msgs::Header;
 use gripsight_msgs::{
-    GapReport, Handshake, Interval, MagicFormula, PacejkaParams, PeakFriction, Range, SignalCorrections,
-    StateSequence,
+    Handshake, Interval, MagicFormula, PacejkaParams, PeakFriction, Range, SignalCorrections, StateSequence,
 };
 
 /// A parameter set; no two of its numbers are equal, and none is a short decimal.
@@ -65,16 +65,10 @@ pub fn sequence(samples: usize) -> StateSequence {
     }
 }
 
-/// A report that is over 64 KB long and ends in a text of `length` bytes; nothing aligns its end.
-pub fn report(length: usize) -> GapReport {
-    GapReport {
-        header: header(),
-        handshake: handshake(2),
-        verdict: "no_gap".into(),
-        drive_next: vec!["hairpins, slowly".into(); 4000],
-        report_directory: "d".repeat(length),
-        ..GapReport::default()
-    }
+/// A picture of `length` bytes; nothing aligns its end.
+pub fn picture(length: usize) -> CompressedImage {
+    let data = (0..length).map(|index| (index % 251) as u8).collect();
+    CompressedImage { header: header(), format: "jpeg".into(), data }
 }
 
 fn header() -> Header {

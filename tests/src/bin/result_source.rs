@@ -1,12 +1,13 @@
 //! A node that publishes known results, for the tests of the runtime: a latched parameter set on
-//! `~/pacejka`, every 0.2 s a state sequence on `~/sequence` and a long report on `~/report`, and odometry
+//! `~/pacejka`, every 0.2 s a state sequence on `~/sequence` and a picture on `~/picture`, and odometry
 //! from `odom` on `~/echo`.
 
 use std::future::Future;
 use std::time::Duration;
 
 use gripsight_msgs::standard::nav_msgs::Odometry;
-use gripsight_msgs::{GapReport, PacejkaParams, StateSequence};
+use gripsight_msgs::standard::sensor_msgs::CompressedImage;
+use gripsight_msgs::{PacejkaParams, StateSequence};
 use gripsight_runtime::{Descriptor, Error, Level, Node, Qos, Status, run};
 use gripsight_tests::samples;
 
@@ -19,7 +20,7 @@ fn publish_results(node: &mut Node) -> Result<impl Future<Output = Result<(), Er
     let mut odometry = node.subscription::<Odometry>("odom", node.sensor_qos(50))?;
     let pacejka = node.publisher::<PacejkaParams>("~/pacejka", Qos::latched())?;
     let sequence = node.publisher::<StateSequence>("~/sequence", Qos::reliable(10))?;
-    let report = node.publisher::<GapReport>("~/report", Qos::reliable(10))?;
+    let picture = node.publisher::<CompressedImage>("~/picture", Qos::reliable(10))?;
     let echo = node.publisher::<Odometry>("~/echo", Qos::reliable(1000))?;
     let diagnostics = node.diagnostics();
     tracing::info!("{} publishes as {}", name.get(), node.name());
@@ -41,7 +42,7 @@ fn publish_results(node: &mut Node) -> Result<impl Future<Output = Result<(), Er
                 _ = ticks.tick() => {
                     let count = usize::try_from(samples.get()).unwrap_or(1);
                     sequence.publish(&samples::sequence(count)).await;
-                    report.publish(&samples::report(sent % 4)).await;
+                    picture.publish(&samples::picture(100_000 + sent % 4)).await;
                     sent += 1;
                 }
             }
