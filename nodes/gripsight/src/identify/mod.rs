@@ -223,7 +223,7 @@ fn write(
         data_stamp: provenance.stamp(),
         tool_version: provenance.tool_version.clone(),
         vehicle_hash: provenance.vehicle_hash.clone(),
-        seed: args.seed,
+        seed: Some(args.seed),
         command: provenance.command.clone(),
     };
     let truth =

@@ -3,12 +3,14 @@
 //! A page is one HTML file without scripts or references: it opens from a USB stick and prints on two sheets. Pictures are SVG
 //! inside it. Colours have fixed [`Role`]s in every picture.
 //!
-//! [`identification_page`] shows the result of an identification. The pages are built of [`Chart`]s, bars and tables; nothing here computes what is
-//! not only for the eye.
+//! [`identification_page`] shows the result of an identification, [`gap_page`] that of a diagnosis. They are built of [`Chart`]s,
+//! bars and tables; nothing here computes what is not only for the eye.
 
 mod bars;
 mod chart;
 mod error;
+mod gap;
+mod health;
 mod identification;
 mod page;
 mod role;
@@ -16,6 +18,7 @@ pub mod text;
 
 pub use chart::{Axis, Chart, Layer};
 pub use error::ReportError;
+pub use gap::{GapInput, gap_page};
 pub use identification::{IdentificationInput, identification_page};
 pub use page::Header;
 pub use role::Role;

@@ -18,8 +18,8 @@ pub struct Header {
     pub tool_version: String,
     /// The car's parameters as a number.
     pub vehicle_hash: String,
-    /// Seed of every random number.
-    pub seed: u64,
+    /// Seed of every random number, where there are any.
+    pub seed: Option<u64>,
     /// The exact command, with the output folder's name left open.
     pub command: String,
 }
@@ -43,7 +43,7 @@ pub(crate) fn page(title: &str, tone: Tone, verdict: &str, header: &Header, body
         ("Recorded", &header.data_stamp),
         ("Tool", &format!("gripsight {}", header.tool_version)),
         ("Vehicle hash", &header.vehicle_hash),
-        ("Seed", &header.seed.to_string()),
+        ("Seed", &header.seed.map_or_else(|| "none needed".to_owned(), |s| s.to_string())),
     ];
     html! {
         (DOCTYPE)
@@ -122,10 +122,10 @@ pub(crate) fn table<const N: usize>(head: [&str; N], rows: &[[String; N]]) -> Ma
 }
 
 /// Names and what is to be said of them.
-pub(crate) fn facts_table(facts: &[(&str, String)]) -> Markup {
+pub(crate) fn facts_table<S: AsRef<str>>(facts: &[(S, String)]) -> Markup {
     html! {
         table.facts-table {
-            tbody { @for (name, value) in facts { tr { td { (name) } td { (value) } } } }
+            tbody { @for (name, value) in facts { tr { td { (name.as_ref()) } td { (value) } } } }
         }
     }
 }

@@ -18,7 +18,7 @@ fn header() -> Header {
         data_stamp: "2023-11-14T22:13:34.271Z".into(),
         tool_version: "0.1.0".into(),
         vehicle_hash: "00ab".into(),
-        seed: 7,
+        seed: Some(7),
         command: "gripsight identify laps.mcap --seed 7 --out DIR".into(),
     }
 }

@@ -53,7 +53,7 @@ pub fn identification_page(input: &IdentificationInput<'_>) -> Result<String, Re
         (section("Rollout error over horizon, held-out data", false, &figure(&pictures::horizon(outcome), "")?))
         (section("Lateral and forward acceleration", false, &figure(&pictures::accelerations(outcome), "")?))
         (section("Held-out errors", false, &tables::errors(outcome)))
-        (section("Data", false, &tables::health(outcome, input.data_notes)))
+        (section("Data", false, &tables::data(outcome, input.data_notes)))
         (section("Turns of the loop", true, &html! {
             p { (how(outcome)) }
             (tables::iterations(outcome))

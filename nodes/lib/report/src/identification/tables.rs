@@ -3,6 +3,7 @@
 use gripsight_identification::{Estimate, Outcome, PeakFriction, Range};
 use maud::{Markup, html};
 
+use crate::health::health;
 use crate::page::{facts_table, list, table};
 use crate::text::{fixed, interval, percent, significant, with_interval};
 
@@ -87,49 +88,16 @@ pub(super) fn errors(outcome: &Outcome) -> Markup {
 }
 
 /// What the data are like.
-pub(super) fn health(outcome: &Outcome, notes: &[String]) -> Markup {
-    let h = &outcome.health;
-    let longest_s = h.gaps.iter().map(|g| g.to_s - g.from_s).fold(0.0, f64::max);
-    let gaps = if h.gaps.is_empty() {
-        "none".to_owned()
-    } else {
-        format!("{}, longest {} s", h.gaps.len(), significant(longest_s, 2))
-    };
-    let frozen = if h.frozen.is_empty() {
-        "none".to_owned()
-    } else {
-        h.frozen
-            .iter()
-            .map(|f| format!("{} {}–{} s", f.channel, fixed(f.from_s, 1), fixed(f.to_s, 1)))
-            .collect::<Vec<_>>()
-            .join(", ")
-    };
-    let recorded = if h.recorded.is_empty() { "nothing".to_owned() } else { h.recorded.join(", ") };
+pub(super) fn data(outcome: &Outcome, notes: &[String]) -> Markup {
     let speeds = &outcome.v_x_range_mps;
-    let facts = [
-        (
-            "Samples",
-            format!(
-                "{} at {} Hz, jitter {} ms",
-                h.samples,
-                significant(h.rate_hz, 3),
-                significant(1000.0 * h.jitter_s, 2)
-            ),
-        ),
-        ("Duration", format!("{} s, moving {}", fixed(h.duration_s, 1), percent(h.moving_share))),
-        (
-            "Speed",
-            format!(
-                "{} … {} m/s, mean {} m/s",
-                fixed(speeds.low, 1),
-                fixed(speeds.high, 1),
-                fixed(outcome.mean_speed_mps, 1)
-            ),
-        ),
-        ("Pauses", gaps),
-        ("Frozen", frozen),
-        ("Also recorded", recorded),
-    ];
+    let speed = format!(
+        "{} … {} m/s, mean {} m/s",
+        fixed(speeds.low, 1),
+        fixed(speeds.high, 1),
+        fixed(outcome.mean_speed_mps, 1)
+    );
+    let mut facts = health(&outcome.health);
+    facts.push(("Speed", speed));
     html! {
         (facts_table(&facts))
         @if !notes.is_empty() { (list(notes, "")) }

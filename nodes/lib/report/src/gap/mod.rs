@@ -1,0 +1,91 @@
+//! The page of a diagnosis: where model and real car disagree, why, and by how much.
+
+mod pictures;
+mod tables;
+
+use gripsight_gap::{Diagnosis, Verdict};
+use maud::html;
+
+use crate::page::{Tone, facts_table, figure, list, page, section};
+use crate::text::{interval, percent};
+use crate::{Header, ReportError};
+
+/// What the page of a diagnosis shows.
+#[derive(Debug, Clone, Copy)]
+pub struct GapInput<'a> {
+    /// What was found.
+    pub diagnosis: &'a Diagnosis,
+    /// The head of the page.
+    pub header: &'a Header,
+    /// What reading the data met, a sentence each.
+    pub data_notes: &'a [String],
+}
+
+/// The page of a diagnosis, as one HTML file.
+///
+/// # Errors
+/// [`ReportError::Drawing`].
+pub fn gap_page(input: &GapInput<'_>) -> Result<String, ReportError> {
+    let d = input.diagnosis;
+    let [front, rear] = pictures::tire_curves(d);
+    let [v_y, yaw_rate] = pictures::worst_seconds(d);
+    let (heat, scale) = pictures::heat(d);
+    let horizon = d.gap.horizon_s;
+    let drawn = !d.series.horizon.is_empty();
+    let body = html! {
+        (section("How large the gap is", true, &tables::budget(d)))
+        (section("Effects, ranked", true, &tables::effects(d)))
+        @if drawn {
+            (section("Front tires", false, &figure(&front, "")?))
+            (section("Rear tires", false, &figure(&rear, "")?))
+            (section("Lateral velocity, worst seconds", false, &figure(&v_y, "")?))
+            (section("Yaw rate, worst seconds", false, &figure(&yaw_rate, "Rollouts start anew from the best state at every window.")?))
+            (section("Error over speed and lateral acceleration", false, &html! { (figure(&heat, "")?) (scale) }))
+            (section(pictures::along_title(d), false, &figure(&pictures::along(d), "")?))
+            (section("Error over horizon", false, &figure(&pictures::horizon(d), "")?))
+            (section("Lateral and forward acceleration", false, &figure(&pictures::accelerations(d), "")?))
+        }
+        (section("Where it lies", false, &tables::places(d)))
+        (section("Drive or record next", false, &list(&d.drive_next, "Nothing in particular.")))
+        (section("Why", false, &list(&d.reasons, "")))
+        (section("What these signals cannot show", false, &facts_table(&tables::invisible(d))))
+        (section("Kinematics", false, &facts_table(&tables::identities(d))))
+        (section("Data", false, &tables::data(d, input.data_notes)))
+        (section("How it was measured", true, &html! {
+            p {
+                "Mean squared error of open-loop rollouts of " (crate::text::significant(horizon, 2)) " s on " (d.gap.scored_on)
+                ", each channel over its noise (" (tables::noise(d)) "). Intervals are 90 %, by block bootstrap."
+            }
+        }))
+    };
+    let tone = match d.verdict {
+        Verdict::Effects | Verdict::TireRetuneOnly | Verdict::NoGap => Tone::Good,
+        Verdict::NoneOfThese | Verdict::NotIdentifiable => Tone::Caution,
+    };
+    Ok(page("Sim-to-real gap", tone, &verdict(d), input.header, &body))
+}
+
+/// The first line.
+fn verdict(d: &Diagnosis) -> String {
+    match d.verdict {
+        Verdict::Effects => {
+            let named: Vec<String> = d.effects.iter().filter(|e| e.accepted).map(tables::named).collect();
+            let closed = &d.gap_closed_fraction;
+            format!(
+                "The gap is {}: {} of what other tires leave closes ({} %).",
+                named.join(" and "),
+                percent(closed.value),
+                interval(100.0 * closed.low, 100.0 * closed.high)
+            )
+        }
+        Verdict::TireRetuneOnly => "Other tires close the gap; no other effect is needed.".into(),
+        Verdict::NoGap => {
+            "No gap: model and car agree within the noise and the model's usual imperfection.".into()
+        }
+        Verdict::NoneOfThese => "There is a gap that no effect of the library explains.".into(),
+        Verdict::NotIdentifiable => match d.reasons.first() {
+            Some(reason) => format!("These data cannot tell: {reason}."),
+            None => "These data cannot tell.".into(),
+        },
+    }
+}

@@ -1,0 +1,152 @@
+//! The pictures of a diagnosis.
+
+use gripsight_gap::{Diagnosis, Place};
+use maud::{Markup, html};
+
+use crate::chart::heat as heat_color;
+use crate::text::significant;
+use crate::{Axis, Chart, Layer, Role};
+
+/// Force over slip without and with the effects, front and rear.
+pub(super) fn tire_curves(d: &Diagnosis) -> [Chart; 2] {
+    let axle = |title: &str, k: usize| {
+        let points = &d.series.tire_curves[k];
+        let driven_deg = d.series.slip_driven_rad[k].to_degrees();
+        let end_deg = points.last().map_or(1.0, |p| p[0].to_degrees());
+        let line = |role: Role, name: &str, column: usize| Layer::Line {
+            role,
+            name: name.into(),
+            points: points.iter().map(|p| (p[0].to_degrees(), p[column])).collect(),
+        };
+        let with_effects = d.effects.iter().any(|e| e.accepted);
+        let chart = Chart::new(title, Axis::new("slip angle / °").with_range(0.0, end_deg), force_axis())
+            .with(Layer::Unvisited { name: "slip not driven".into(), from: driven_deg, to: end_deg })
+            .with(line(Role::Nominal, "fitted without effects", 1));
+        if with_effects { chart.with(line(Role::Identified, "with the effects named", 2)) } else { chart }
+    };
+    [axle("front tires", 0), axle("rear tires", 1)]
+}
+
+fn force_axis() -> Axis {
+    Axis::new("lateral force / load").from_zero()
+}
+
+/// Lateral velocity and yaw rate over the worst seconds.
+pub(super) fn worst_seconds(d: &Diagnosis) -> [Chart; 2] {
+    let points = &d.series.worst;
+    let picture = |title: &str, unit: &str, first: usize| {
+        let line = |role: Role, name: &str, column: usize| Layer::Line {
+            role,
+            name: name.into(),
+            points: points.iter().map(|p| (p[0], p[column])).collect(),
+        };
+        Chart::new(title, Axis::new("time / s"), Axis::new(unit))
+            .sized(460, 220)
+            .with(line(Role::Nominal, "model as it came", first + 1))
+            .with(line(Role::Measured, "measured", first))
+            .with(line(Role::Identified, "with the effects", first + 2))
+    };
+    [picture("lateral velocity", "v_y / (m/s)", 1), picture("yaw rate", "yaw rate / (rad/s)", 4)]
+}
+
+/// Error over speed and lateral acceleration, and its scale.
+pub(super) fn heat(d: &Diagnosis) -> (Chart, Markup) {
+    let cells = &d.series.heat;
+    let half = |k: usize| spacing(cells.iter().map(|c| c[k])) / 2.0;
+    let (half_v, half_a) = (half(0), half(1));
+    let most = cells.iter().map(|c| c[2]).filter(|c| c.is_finite()).fold(0.0, f64::max).max(2.0);
+    // By the logarithm, from the noise upwards: a regime ten times as bad must not hide one three times as bad.
+    let share = |chi2: f64| (chi2.max(1.0).ln() / most.ln()).min(1.0);
+    let cells = cells
+        .iter()
+        .map(|c| (c[0] - half_v, c[0] + half_v, c[1] - half_a, c[1] + half_a, share(c[2])))
+        .collect();
+    let chart = Chart::new(
+        "error over speed and lateral acceleration",
+        Axis::new("speed / (m/s)").from_zero(),
+        Axis::new("|lateral acceleration| / (m/s²)").from_zero(),
+    )
+    .sized(460, 230)
+    .with(Layer::Cells { cells });
+    let stops: Vec<String> = (0..=4)
+        .map(|k| heat_color(f64::from(k) / 4.0))
+        .map(|c| format!("#{:02x}{:02x}{:02x}", c.0, c.1, c.2))
+        .collect();
+    let gradient = format!("background:linear-gradient(to right,{})", stops.join(","));
+    let scale = html! {
+        figcaption { "noise" span.scale style=(gradient) {} (significant(most, 2)) " times its variance; no cell: not driven" }
+    };
+    (chart, scale)
+}
+
+/// Distance between neighbours on a grid of which some places are missing.
+fn spacing(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    let steps = values.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 1e-9);
+    let step = steps.fold(f64::INFINITY, f64::min);
+    if step.is_finite() { step } else { values.first().map_or(1.0, |v| 2.0 * v.abs().max(0.5)) }
+}
+
+/// Whether there are laps to place errors on.
+pub(super) fn along_title(d: &Diagnosis) -> &'static str {
+    if d.places.track_position.is_empty() { "Error over time" } else { "Error along the lap" }
+}
+
+/// Error along the lap, or over time without laps.
+pub(super) fn along(d: &Diagnosis) -> Chart {
+    let (places, axis) = if d.places.track_position.is_empty() {
+        (&d.places.time, "time / s")
+    } else {
+        (&d.places.track_position, "distance along the lap / m")
+    };
+    let mut bins: Vec<&Place> = places.iter().filter(|p| p.channel == "all").collect();
+    bins.sort_by(|a, b| a.low.total_cmp(&b.low));
+    let steps = bins.iter().flat_map(|p| [(p.low, p.chi2_per_dof), (p.high, p.chi2_per_dof)]).collect();
+    Chart::new("error along the drive", Axis::new(axis), Axis::new("squared error / noise").from_zero())
+        .sized(460, 230)
+        .with(Layer::Line { role: Role::Nominal, name: "model as it came".into(), points: steps })
+        .with(Layer::Level { role: Role::Measured, name: "noise".into(), y: 1.0 })
+}
+
+/// Error of rollouts over their length.
+pub(super) fn horizon(d: &Diagnosis) -> Chart {
+    let line = |role: Role, name: &str, column: usize| Layer::Line {
+        role,
+        name: name.into(),
+        points: d.series.horizon.iter().map(|p| (p[0], p[column])).collect(),
+    };
+    Chart::new(
+        "error over horizon",
+        Axis::new("length of the rollouts / s").from_zero(),
+        Axis::new("squared error / noise").from_zero(),
+    )
+    .sized(460, 230)
+    .with(line(Role::Nominal, "model as it came", 1))
+    .with(line(Role::Identified, "tires and effects fitted", 3))
+    .with(Layer::Level { role: Role::Measured, name: "noise".into(), y: 1.0 })
+}
+
+/// The g-g diagram of the drive.
+pub(super) fn accelerations(d: &Diagnosis) -> Chart {
+    let points = d.series.g_g.iter().map(|p| (p[1], p[0])).collect();
+    Chart::new(
+        "lateral and forward acceleration",
+        Axis::new("lateral, left positive / (m/s²)"),
+        Axis::new("forward / (m/s²)"),
+    )
+    .sized(460, 230)
+    .with(Layer::Cloud { role: Role::Measured, name: "driven".into(), points })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_grid_with_holes_keeps_its_step() {
+        assert_eq!(spacing([0.5, 2.5, 0.5, 1.5, 5.5].into_iter()), 1.0);
+        assert_eq!(spacing([3.0].into_iter()), 6.0);
+        assert_eq!(spacing(std::iter::empty()), 1.0);
+    }
+}
