@@ -52,8 +52,9 @@ def nodes(context):
     def remaps(*names):
         return [(name, topics[name]) for name in names if name in topics]
 
-    def node(name, remappings=(), **parameters):
+    def node(name, remappings=(), prefix="", **parameters):
         return Node(
+            prefix=prefix,
             package=f"gripsight_{name}",
             executable=name,
             name=name,
@@ -79,7 +80,9 @@ def nodes(context):
     elif value["prior_mu"]:
         started.append(node("camera_prior", configured_mu=float(value["prior_mu"])))
     if value["gap"] == "true":
-        started.append(node("gap_diagnosis", [("sequence", "telemetry/sequence"), ("pacejka", "identifier/pacejka")]))
+        # The diagnosis never stands in the way of the other nodes.
+        topics_in = [("sequence", "telemetry/sequence"), ("pacejka", "identifier/pacejka")]
+        started.append(node("gap_diagnosis", topics_in, prefix="nice -n 10"))
     if value["bag"]:
         player = Node(
             package="gripsight_bag_player",

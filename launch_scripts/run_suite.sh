@@ -65,11 +65,12 @@ remaps() {
 }
 
 pids=()
+priority=()
 start() {
     local node=$1
     shift
     [[ -x $bin/$node ]] || fail "no binary '$bin/$node': build it with cargo build --release" 1
-    "$bin/$node" --ros-args --params-file "$params" --params-file "$vehicle" "$@" &
+    "${priority[@]}" "$bin/$node" --ros-args --params-file "$params" --params-file "$vehicle" "$@" &
     pids+=($!)
 }
 # shellcheck disable=SC2329
@@ -98,6 +99,8 @@ elif [[ -n $prior ]]; then
     start camera_prior -p "configured_mu:=$prior" "${replay[@]}"
 fi
 if $gap; then
+    # The diagnosis never stands in the way of the other nodes.
+    priority=(nice -n 10)
     start gap_diagnosis -r sequence:=telemetry/sequence -r pacejka:=identifier/pacejka "${replay[@]}"
 fi
 if [[ -z $bag ]]; then

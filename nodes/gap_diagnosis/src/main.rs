@@ -1,3 +1,10 @@
-//! Node: where model and car disagree, and why.
+//! Node: where the model in use and the real car disagree, and why. See the README beside this folder.
 
-fn main() {}
+mod diagnostics;
+mod message;
+mod node;
+mod report;
+
+fn main() -> anyhow::Result<()> {
+    gripsight_runtime::run("gap_diagnosis", node::setup)
+}

@@ -1,6 +1,7 @@
 //! `tracing` to the terminal (standard error) and to `/rosout`.
 
 use std::fmt::Write;
+use std::io::IsTerminal;
 
 use gripsight_msgs::standard::rcl_interfaces::Log;
 use tokio::sync::mpsc;
@@ -19,9 +20,11 @@ const WAITING_LINES: usize = 1000;
 /// none when another node of the process has started logging already.
 pub(crate) fn start(args: &Args) -> mpsc::Receiver<Log> {
     let (lines, receiver) = mpsc::channel(WAITING_LINES);
-    let terminal = args
-        .to_terminal
-        .then(|| tracing_subscriber::fmt::layer().with_target(false).with_writer(std::io::stderr));
+    // The target tells whose line it is where a launcher mixes the output of several nodes.
+    let terminal = args.to_terminal.then(|| {
+        let colours = std::io::stderr().is_terminal();
+        tracing_subscriber::fmt::layer().with_ansi(colours).with_writer(std::io::stderr)
+    });
     let rosout = args.to_rosout.then(|| RosoutLayer { lines });
     // The second call in one process (tests) finds a subscriber set, and keeps it.
     tracing_subscriber::registry().with(filter(args)).with(terminal).with(rosout).try_init().ok();

@@ -1,0 +1,207 @@
+//! Topics in, topics out. A diagnosis never stands in the way of the control nodes: one at a time, on few threads, on the newest
+//! sequence, the ones between passed over.
+
+use std::cell::RefCell;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use gripsight_bag::Reassembler;
+use gripsight_gap::{Diagnosis, GapError, Request, diagnose};
+use gripsight_identification::vehicle_hash;
+use gripsight_msgs::{
+    GapReport, MagicFormula as FormulaMessage, PacejkaParams, StateSequence as SequenceMessage,
+};
+use gripsight_report::Header;
+use gripsight_runtime::{
+    Descriptor, Diagnostics, Node, Parameter, Publisher, Qos, Subscription, vehicle_parameters,
+};
+use gripsight_signals::StateSequence;
+use gripsight_vehicle::{MagicFormula, PacejkaParameters, VehicleParameters};
+use tokio::sync::watch;
+
+use crate::diagnostics::{Facts, Last, status};
+use crate::{message, report};
+
+/// Declares parameters and topics; gives the node's work.
+pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyhow::Result<()>> + use<>> {
+    let vehicle = Arc::new(vehicle_parameters(node)?);
+    let threads = node.parameter(
+        "threads",
+        1,
+        Descriptor::new("Threads that a diagnosis may use").range(1.0..=64.0).read_only(),
+    )?;
+    rayon::ThreadPoolBuilder::new().num_threads(threads.get() as usize).build_global()?;
+    let report_folder = node.parameter(
+        "report_folder",
+        String::new(),
+        Descriptor::new("Folder for the reports' files; empty: none are written"),
+    )?;
+    let without = node.parameter(
+        "without",
+        Vec::<String>::new(),
+        Descriptor::new("Effects to leave out of the library, by name"),
+    )?;
+    let sequences = node.subscription::<SequenceMessage>("sequence", Qos::latched().with_depth(16))?;
+    let tires = node.subscription::<PacejkaParams>("pacejka", Qos::latched())?;
+    let output = node.publisher::<GapReport>("~/report", Qos::latched())?;
+    let diagnostics = node.diagnostics();
+
+    Ok(async move {
+        let facts = RefCell::new(Facts {
+            last: Last::None,
+            diagnoses: 0,
+            received: 0,
+            took_s: 0.0,
+            has_tires: false,
+        });
+        let (newest, sequence) = watch::channel(None);
+        let (accepted, tires_in_use) = watch::channel(None);
+        let diagnoser = Diagnoser { vehicle, report_folder, without, output, facts: &facts };
+        tokio::select! {
+            () = collect_sequences(sequences, newest, &facts) => {}
+            () = collect_tires(tires, accepted, &diagnoser.vehicle, &facts) => {}
+            () = say(&diagnostics, &facts) => {}
+            () = diagnoser.diagnose_each(sequence, tires_in_use) => {}
+        }
+        Ok(())
+    })
+}
+
+async fn collect_sequences(
+    mut messages: Subscription<SequenceMessage>,
+    newest: watch::Sender<Option<Arc<StateSequence>>>,
+    facts: &RefCell<Facts>,
+) {
+    let mut reassembler = Reassembler::default();
+    while let Some(message) = messages.next().await {
+        match reassembler.push(message) {
+            Ok(Some(recorded)) => {
+                facts.borrow_mut().received += 1;
+                newest.send_replace(Some(Arc::new(recorded.sequence)));
+            }
+            Ok(None) => {}
+            Err(error) => tracing::warn!("sequence left out: {error}"),
+        }
+    }
+}
+
+async fn collect_tires(
+    mut messages: Subscription<PacejkaParams>,
+    newest: watch::Sender<Option<PacejkaParameters>>,
+    vehicle: &VehicleParameters,
+    facts: &RefCell<Facts>,
+) {
+    let hash = vehicle_hash(vehicle);
+    while let Some(message) = messages.next().await {
+        if message.status != PacejkaParams::ACCEPTED || message.handshake.vehicle_hash != hash {
+            tracing::warn!("tires left out: not accepted, or of a car with other parameters");
+            continue;
+        }
+        facts.borrow_mut().has_tires = true;
+        newest.send_replace(Some(PacejkaParameters {
+            front: formula(&message.front),
+            rear: formula(&message.rear),
+        }));
+    }
+}
+
+fn formula(m: &FormulaMessage) -> MagicFormula {
+    MagicFormula { b: m.b, c: m.c, d: m.d, e: m.e }
+}
+
+async fn say(diagnostics: &Diagnostics, facts: &RefCell<Facts>) {
+    let mut ticks = tokio::time::interval(Duration::from_secs(1));
+    loop {
+        ticks.tick().await;
+        diagnostics.report("gap", status(&facts.borrow()));
+    }
+}
+
+struct Diagnoser<'a> {
+    vehicle: Arc<VehicleParameters>,
+    report_folder: Parameter<String>,
+    without: Parameter<Vec<String>>,
+    output: Publisher<GapReport>,
+    facts: &'a RefCell<Facts>,
+}
+
+impl Diagnoser<'_> {
+    /// One diagnosis after the other, each of the newest sequence, against the tires in use.
+    async fn diagnose_each(
+        &self,
+        mut sequences: watch::Receiver<Option<Arc<StateSequence>>>,
+        tires: watch::Receiver<Option<PacejkaParameters>>,
+    ) {
+        while sequences.changed().await.is_ok() {
+            let Some(sequence) = sequences.borrow_and_update().clone() else { continue };
+            let start = Instant::now();
+            let result = self.diagnose(Arc::clone(&sequence), *tires.borrow()).await;
+            let mut last = match result {
+                Ok(diagnosis) => self.publish(&diagnosis, &sequence).await,
+                Err(reason) => Last::Failed { reason },
+            };
+            if let Last::Failed { reason } = &mut last {
+                tracing::error!("sequence {}: {reason}", sequence.sequence_id);
+            }
+            let mut facts = self.facts.borrow_mut();
+            facts.last = last;
+            facts.diagnoses += 1;
+            facts.took_s = start.elapsed().as_secs_f64();
+        }
+    }
+
+    async fn diagnose(
+        &self,
+        sequence: Arc<StateSequence>,
+        tires: Option<PacejkaParameters>,
+    ) -> Result<Diagnosis, String> {
+        let (vehicle, without) = (Arc::clone(&self.vehicle), self.without.get());
+        let work = move || -> Result<Diagnosis, GapError> {
+            let request = Request {
+                sequence: &sequence,
+                held_out: None,
+                reference: None,
+                vehicle: &vehicle,
+                tires,
+                without: &without,
+                only: &[],
+            };
+            diagnose(&request, &mut |step| tracing::debug!("{step}"))
+        };
+        match tokio::task::spawn_blocking(work).await {
+            Ok(result) => result.map_err(|error| error.to_string()),
+            Err(error) => Err(format!("the diagnosis ended abnormally: {error}")),
+        }
+    }
+
+    async fn publish(&self, diagnosis: &Diagnosis, sequence: &StateSequence) -> Last {
+        let hash = vehicle_hash(&self.vehicle);
+        let folder = self.report_folder.get();
+        let written = if folder.is_empty() {
+            Ok(PathBuf::new())
+        } else {
+            let header = Header {
+                car: self.vehicle.name.clone().unwrap_or_else(|| "car".to_owned()),
+                bag: format!("live, sequence {}", sequence.sequence_id),
+                data_stamp: format!("{:.3} s", sequence.start_stamp_ns as f64 / gripsight_signals::NS_PER_S),
+                tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+                vehicle_hash: hash.clone(),
+                seed: None,
+                command: "gap_diagnosis".to_owned(),
+            };
+            report::write(&PathBuf::from(folder), diagnosis, &header, sequence.sequence_id)
+        };
+        let directory = match written {
+            Ok(directory) => directory.display().to_string(),
+            Err(error) => {
+                tracing::error!("report not written: {error:#}");
+                String::new()
+            }
+        };
+        self.output.publish(&message::report(diagnosis, sequence, &hash, directory)).await;
+        let because = diagnosis.reasons.first().cloned().unwrap_or_default();
+        tracing::info!("sequence {}: {}: {because}", sequence.sequence_id, diagnosis.verdict.name());
+        Last::Done { verdict: diagnosis.verdict.name(), because }
+    }
+}
