@@ -1,22 +1,26 @@
 // A Fast DDS peer of the suite: it knows ROS 2's names and the CDR of PacejkaParams, and nothing of the suite's code.
 //
-//     fastdds_peer TOPIC COUNT TIMEOUT_S       subscribes to gripsight_msgs/msg/PacejkaParams, reliable and latched
+//     fastdds_peer TOPIC COUNT TIMEOUT_S        subscribes to gripsight_msgs/msg/PacejkaParams, reliable and latched
+//     fastdds_peer get NODE PARAMETER TIMEOUT_S  asks a node for an integer parameter, as rmw_fastrtps does
 //
 // Prints `ready`, then one line of JSON per message, with the field names of the .msg file. Exit code 1: not all messages
 // came in time. Build: c++ -std=c++14 fastdds_peer.cpp -lfastrtps -lfastcdr
 
-#include <cstdio>
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <iomanip>
 #include <iostream>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <fastcdr/Cdr.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
@@ -34,13 +38,19 @@ public:
         m_typeSize = 4096;
         m_isGetKeyDefined = false;
     }
-    bool serialize(void*, SerializedPayload_t*) override { return false; }
+    bool serialize(void* data, SerializedPayload_t* payload) override {
+        const auto& bytes = *static_cast<std::vector<char>*>(data);
+        payload->encapsulation = CDR_LE;
+        payload->length = bytes.size();
+        std::memcpy(payload->data, bytes.data(), bytes.size());
+        return true;
+    }
     bool deserialize(SerializedPayload_t* payload, void* data) override {
         static_cast<std::vector<char>*>(data)->assign(payload->data, payload->data + payload->length);
         return true;
     }
-    std::function<uint32_t()> getSerializedSizeProvider(void*) override {
-        return [] { return 0u; };
+    std::function<uint32_t()> getSerializedSizeProvider(void* data) override {
+        return [data] { return static_cast<uint32_t>(static_cast<std::vector<char>*>(data)->size()); };
     }
     void* createData() override { return new std::vector<char>; }
     void deleteData(void* data) override { delete static_cast<std::vector<char>*>(data); }
@@ -128,45 +138,111 @@ private:
     bool first_ = true;
 };
 
-int main(int argc, char** argv) {
-    if (argc != 4) {
-        std::cerr << "usage: fastdds_peer TOPIC COUNT TIMEOUT_S\n";
-        return 2;
-    }
+// Loopback only, and no shared memory: the suite speaks UDP.
+DomainParticipant* join() {
     const char* domain = std::getenv("ROS_DOMAIN_ID");
-    const int count = std::atoi(argv[2]), timeout_s = std::atoi(argv[3]);
-
-    // Loopback only, and no shared memory: the suite speaks UDP.
-    DomainParticipantQos participant_qos;
+    DomainParticipantQos qos;
     auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
     udp->interfaceWhiteList.push_back("127.0.0.1");
-    participant_qos.transport().use_builtin_transports = false;
-    participant_qos.transport().user_transports.push_back(udp);
-    DomainParticipant* participant = DomainParticipantFactory::get_instance()->create_participant(
-        domain ? std::atoi(domain) : 0, participant_qos);
-    if (!participant) return 1;
+    qos.transport().use_builtin_transports = false;
+    qos.transport().user_transports.push_back(udp);
+    return DomainParticipantFactory::get_instance()->create_participant(domain ? std::atoi(domain) : 0, qos);
+}
 
-    TypeSupport type(new RawType("gripsight_msgs::msg::dds_::PacejkaParams_"));
+Topic* topic(DomainParticipant* participant, const std::string& name, const char* type_name) {
+    TypeSupport type(new RawType(type_name));
     type.register_type(participant);
-    Topic* topic = participant->create_topic(std::string("rt") + argv[1], type.get_type_name(), TOPIC_QOS_DEFAULT);
+    return participant->create_topic(name, type_name, TOPIC_QOS_DEFAULT);
+}
+
+DataReader* reader(DomainParticipant* participant, Topic* topic, DurabilityQosPolicyKind durability) {
     DataReaderQos qos;
     qos.reliability().kind = RELIABLE_RELIABILITY_QOS;
-    qos.durability().kind = TRANSIENT_LOCAL_DURABILITY_QOS;
+    qos.durability().kind = durability;
     qos.endpoint().history_memory_policy = eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
-    DataReader* reader = participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT)->create_datareader(topic, qos);
-    if (!reader) return 1;
-    std::cout << "ready" << std::endl;
+    return participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT)->create_datareader(topic, qos);
+}
 
+bool subscribe(const std::string& name, int count, int timeout_s) {
+    DomainParticipant* participant = join();
+    DataReader* results =
+        reader(participant, topic(participant, "rt" + name, "gripsight_msgs::msg::dds_::PacejkaParams_"),
+               TRANSIENT_LOCAL_DURABILITY_QOS);
+    std::cout << "ready" << std::endl;
     int received = 0;
-    while (received < count && reader->wait_for_unread_message({timeout_s, 0})) {
+    while (received < count && results->wait_for_unread_message({timeout_s, 0})) {
         std::vector<char> sample;
         SampleInfo info;
-        if (reader->take_next_sample(&sample, &info) == ReturnCode_t::RETCODE_OK && info.valid_data) {
+        if (results->take_next_sample(&sample, &info) == ReturnCode_t::RETCODE_OK && info.valid_data) {
             std::cout << Decoder(sample).pacejka_params() << std::endl;
             ++received;
         }
     }
+    return received == count;
+}
+
+// The request names the reply's reader as related identity; the reply names it and the request's number.
+bool get(const std::string& node, const std::string& parameter, int timeout_s) {
+    DomainParticipant* participant = join();
+    DataReader* replies = reader(participant,
+                                 topic(participant, "rr" + node + "/get_parametersReply",
+                                       "rcl_interfaces::srv::dds_::GetParameters_Response_"),
+                                 VOLATILE_DURABILITY_QOS);
+    DataWriter* requests = participant->create_publisher(PUBLISHER_QOS_DEFAULT)
+                               ->create_datawriter(topic(participant, "rq" + node + "/get_parametersRequest",
+                                                         "rcl_interfaces::srv::dds_::GetParameters_Request_"),
+                                                   DATAWRITER_QOS_DEFAULT);
+    PublicationMatchedStatus heard;
+    SubscriptionMatchedStatus hears;
+    for (int wait = 0; wait < 100 * timeout_s; ++wait) {
+        requests->get_publication_matched_status(heard);
+        replies->get_subscription_matched_status(hears);
+        if (heard.current_count > 0 && hears.current_count > 0) break;
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+
+    std::vector<char> request(512);
+    eprosima::fastcdr::FastBuffer buffer(request.data(), request.size());
+    eprosima::fastcdr::Cdr out(buffer, eprosima::fastcdr::Cdr::DEFAULT_ENDIAN, eprosima::fastcdr::Cdr::DDS_CDR);
+    out.serialize_encapsulation();
+    out << std::vector<std::string>{parameter};
+    request.resize(out.getSerializedDataLength());
+    eprosima::fastrtps::rtps::WriteParams identity;
+    identity.related_sample_identity().writer_guid() = replies->guid();
+    requests->write(&request, identity);
+
+    while (replies->wait_for_unread_message({timeout_s, 0})) {
+        std::vector<char> reply;
+        SampleInfo info;
+        if (replies->take_next_sample(&reply, &info) != ReturnCode_t::RETCODE_OK || !info.valid_data) continue;
+        if (info.related_sample_identity.writer_guid() != replies->guid() ||
+            info.related_sample_identity.sequence_number() != identity.sample_identity().sequence_number())
+            continue;
+        eprosima::fastcdr::FastBuffer answer(reply.data(), reply.size());
+        eprosima::fastcdr::Cdr in(answer, eprosima::fastcdr::Cdr::DEFAULT_ENDIAN, eprosima::fastcdr::Cdr::DDS_CDR);
+        in.read_encapsulation();
+        uint32_t values;
+        uint8_t type;
+        bool flag;
+        int64_t integer;
+        in >> values >> type >> flag >> integer;
+        std::cout << values << ' ' << +type << ' ' << integer << std::endl;
+        return true;
+    }
+    return false;
+}
+
+int main(int argc, char** argv) {
+    bool done = false;
+    if (argc == 4) {
+        done = subscribe(argv[1], std::atoi(argv[2]), std::atoi(argv[3]));
+    } else if (argc == 5 && std::string(argv[1]) == "get") {
+        done = get(argv[2], argv[3], std::atoi(argv[4]));
+    } else {
+        std::cerr << "usage: fastdds_peer TOPIC COUNT TIMEOUT_S | get NODE PARAMETER TIMEOUT_S\n";
+        return 2;
+    }
     // The process ends here: tearing the entities down one by one would only take time.
     std::cout.flush();
-    std::_Exit(received == count ? 0 : 1);
+    std::_Exit(done ? 0 : 1);
 }

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use byteorder::LittleEndian;
 use gripsight_msgs::standard::ackermann_msgs::AckermannDriveStamped;
 use gripsight_msgs::standard::builtin_interfaces::Time;
+use gripsight_msgs::standard::diagnostic_msgs::DiagnosticArray;
 use gripsight_msgs::standard::nav_msgs::Odometry;
 use gripsight_msgs::standard::rosgraph_msgs::Clock;
 use gripsight_msgs::standard::std_msgs::Header;
@@ -147,6 +148,29 @@ fn the_player_waits_for_the_topics_it_is_told_to() {
     assert_eq!(message::<AckermannDriveStamped>(&drives), drive(0));
     assert_eq!(message::<Value>(&odometry)["header"]["stamp"]["nanosec"], 0);
     player.wait_for_log("played 20 messages", PATIENCE);
+}
+
+#[test]
+fn a_node_under_simulated_time_follows_the_player() {
+    let cyclone = cyclone();
+    if !available(std::slice::from_ref(&cyclone)) {
+        return;
+    }
+    let (domain, folder) = (Domain::new(), tempfile::tempdir().unwrap());
+    let bag = write_bag(folder.path(), 400);
+    let diagnostics = start_cyclone(
+        &domain,
+        &cyclone.unwrap(),
+        &["subscribe", "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "--count", "20"],
+    );
+    let _node = node(&domain, "result_source", &["-p", "use_sim_time:=true"]);
+    let _player = play(&domain, &bag, &[]);
+    let follows = (0..20).any(|_| {
+        let report: DiagnosticArray = message(&diagnostics);
+        let now_s = u32::try_from(report.header.stamp.sec).unwrap();
+        report.status[0].name == "result_source: transport" && (START_S..START_S + 5).contains(&now_s)
+    });
+    assert!(follows);
 }
 
 #[test]

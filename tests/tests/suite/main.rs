@@ -1,4 +1,6 @@
 //! Topic-level tests: real processes, real DDS peers, real time.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+
 mod bag_player;
 mod runtime;

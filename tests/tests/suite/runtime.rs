@@ -178,6 +178,21 @@ fn parameters_come_from_files_and_answer_to_services() {
     std::fs::remove_file(&file).unwrap();
 }
 
+/// The other mapping of services to DDS, that of rmw_fastrtps.
+#[test]
+fn fast_dds_asks_for_a_parameter() {
+    let fast_dds = fast_dds();
+    if !available(std::slice::from_ref(&fast_dds)) {
+        return;
+    }
+    let domain = Domain::new();
+    let _node = source(&domain, &["-p", "seed:=12"]);
+    let mut command = std::process::Command::new(fast_dds.unwrap());
+    command.args(["get", "/result_source", "seed", "20"]);
+    // One value, of type 2 (integer): 12.
+    assert_eq!(Process::start(&domain, command).line(PATIENCE), "1 2 12");
+}
+
 #[test]
 fn no_sample_of_a_peer_is_lost() {
     let cyclone = cyclone();
