@@ -38,7 +38,7 @@ pub struct Request<'a> {
 /// Where a fit without any knowledge of the tires starts.
 const GENERIC: [f64; 8] = [6.5, 1.5, 1.0, 0.0, 6.5, 1.5, 1.0, 0.0];
 /// Windows that the search works on, at most.
-const SEARCH_WINDOWS: usize = 120;
+const SEARCH_WINDOWS: usize = 70;
 /// Held-out time that a score needs.
 const LEAST_HELD_OUT_S: f64 = 3.0;
 
@@ -94,6 +94,7 @@ pub fn diagnose(request: &Request<'_>, progress: &mut dyn FnMut(&str)) -> Result
         progress(&format!("comparing {} effects, round {}", library.len() - state.effects.len(), rounds.len() + 1));
         let here = round(&engine, &state, &library, &search, rounds.len());
         let taken = here.taken;
+        if std::env::var("DBG").is_ok() { for (r, z) in here.refits.iter().zip(&here.lead_z).take(5) { eprintln!("   {} gain {:.0} of {:.0} (res {}) z {:.1} rel {:.2} lead {:.1} {:?}", r.effect.name(), r.gain, here.before.cost, here.before.fit.as_ref().map_or(0, |f| f.linearization.residuals), r.z, r.relative_size, z, r.state.of(r.effect)); } eprintln!("   sigma {:?} / {:?} excess {:?}", engine.sigma, recording.sigma, crate::select::channel_excess(&engine, &here.before, &search)); }
         let next = taken.and_then(|i| here.refits.get(i)).map(|r| r.state.clone());
         rounds.push(here);
         match next {

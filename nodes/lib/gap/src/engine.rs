@@ -72,6 +72,11 @@ impl State {
         None
     }
 
+    /// Residuals that its fit counted.
+    pub(crate) fn residuals(&self) -> f64 {
+        self.fit.as_ref().map_or(1.0, |f| f.linearization.residuals as f64)
+    }
+
     pub(crate) fn tires(&self) -> PacejkaParameters {
         tires_from_parameters(&self.parameters[..TIRES])
     }

@@ -52,6 +52,33 @@ pub(crate) fn spread(runs: &[Run], c: usize, course: bool) -> f64 {
     if n > 0.0 { (square / n).sqrt() } else { 0.0 }
 }
 
+/// Slow noise of the heading: what its course over a second has beyond the integral of the yaw rate, its own scale, offset and
+/// drift left free, so that no error of the yaw rate is taken for noise.
+pub(crate) fn heading_wander(runs: &[Run], heading: usize, yaw_rate: usize) -> f64 {
+    const WINDOW_S: f64 = 1.0;
+    let mut sizes = Vec::new();
+    for run in runs {
+        let len = ((WINDOW_S / run.dt_s) as usize).max(8);
+        for from in (0..run.len().saturating_sub(len)).step_by(len) {
+            let y = &run.measured[heading][from..from + len];
+            let r = &run.measured[yaw_rate][from..from + len];
+            let mut turned = 0.0;
+            let rows: Vec<[f64; 3]> = (0..len)
+                .map(|k| {
+                    turned += r[k] * run.dt_s;
+                    [1.0, k as f64 / len as f64 - 0.5, turned]
+                })
+                .collect();
+            let a = nalgebra::DMatrix::from_fn(len, 3, |i, j| rows[i][j]);
+            let b = nalgebra::DVector::from_column_slice(y);
+            if let Ok(x) = a.clone().svd(true, true).solve(&b, 1e-9) {
+                sizes.push((&a * x - b).norm_squared() / (len - 3) as f64);
+            }
+        }
+    }
+    median(sizes).sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -142,7 +142,10 @@ impl Recording {
         let channels = channels(first, has_command, &identities);
         let runs: Vec<Run> =
             parts.iter().zip(&laps.share).map(|(s, share)| run(s, share, &channels)).collect();
-        let sigma: Vec<f64> = (0..channels.len()).map(|c| crate::noise::sigma(&runs, c)).collect();
+        let mut sigma: Vec<f64> = (0..channels.len()).map(|c| crate::noise::sigma(&runs, c)).collect();
+        if let Some(c) = channels.iter().position(|c| *c == Channel::Heading) {
+            sigma[c] = sigma[c].max(crate::noise::heading_wander(&runs, c, 1));
+        }
         let sigma: Vec<f64> = (0..channels.len())
             .map(|c| if channels[c].scored() { sigma[c] } else { f64::INFINITY })
             .collect();

@@ -12,8 +12,17 @@ use crate::windows::Windows;
 pub(crate) mod thresholds {
     /// Candidates refitted in the first round, and in later rounds.
     pub(crate) const REFITS: [usize; 2] = [9, 6];
+    /// Candidates that promise less than this share of the best one's gain, or of the cost, are not refitted.
+    pub(crate) const WORTH_OF_BEST: f64 = 0.12;
+    pub(crate) const WORTH_OF_COST: f64 = 0.01;
     /// Effects taken at most.
     pub(crate) const MOST_EFFECTS: usize = 4;
+    /// Weighted cost per residual that noise alone leaves.
+    pub(crate) const NOISE_COST: f64 = 0.75;
+    /// Drop of the weighted cost per residual below which an effect does not matter.
+    pub(crate) const LEAST_GAIN: f64 = 0.11;
+    /// Weighted cost per residual up to which there is no gap to explain.
+    pub(crate) const SMALL_COST: f64 = 1.15;
     /// Share of the remaining weighted cost that a first and a later effect must close.
     pub(crate) const LEAST_SHARE: [f64; 2] = [0.10, 0.12];
     /// How sure it must be that a candidate beats the current model, in standard deviations over blocks.
@@ -92,7 +101,8 @@ pub(crate) fn reweigh(engine: &mut Engine<'_>, state: &State, windows: &Windows)
         .collect();
 }
 
-/// Sum over blocks of the differences of two models' window costs, and its standard deviation between blocks.
+/// How much lower the cost of `b` is, and how sure that is: the t statistic over blocks of the signed roots of the differences. The roots keep a
+/// gain that is everywhere, but large in one place, from looking unsure.
 pub(crate) fn difference(windows: &Windows, a: &State, b: &State) -> (f64, f64) {
     let mut blocks: Vec<(usize, f64)> = Vec::new();
     for (k, &block) in windows.block.iter().enumerate() {
@@ -102,18 +112,19 @@ pub(crate) fn difference(windows: &Windows, a: &State, b: &State) -> (f64, f64) 
             None => blocks.push((block, d)),
         }
     }
-    let n = blocks.len() as f64;
+    let n = (blocks.len() as f64).max(2.0);
     let sum: f64 = blocks.iter().map(|b| b.1).sum();
-    let mean = sum / n.max(1.0);
-    let variance = blocks.iter().map(|b| (b.1 - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-    // A difference can hardly be surer than its own noise: a cost difference of d has at least the variance 4 d of chi-squares.
-    (sum, (variance * n + 4.0 * sum.abs()).sqrt().max(1e-9))
+    let roots: Vec<f64> = blocks.iter().map(|b| b.1.abs().sqrt().copysign(b.1)).collect();
+    let mean = roots.iter().sum::<f64>() / n;
+    // The root of a difference of chi-squares varies by about one from noise alone.
+    let variance = roots.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / (n - 1.0) + 1.0;
+    (sum, mean / (variance / n).sqrt())
 }
 
 /// Refits one candidate on top of a state: from the linear step, and from its own starts; the best counts.
 fn refit(engine: &Engine<'_>, state: &State, screened: &Screened, windows: &Windows, extra: &[Vec<f64>]) -> Refit {
-    const FIRST: usize = 3;
-    const REST: usize = 6;
+    const FIRST: usize = 2;
+    const REST: usize = 5;
     let effect = screened.effect;
     let spec = effect.spec();
     let clamp = |values: Vec<f64>| -> Vec<f64> {
@@ -153,11 +164,11 @@ fn refit(engine: &Engine<'_>, state: &State, screened: &Screened, windows: &Wind
         Some(best) => attempt(&best.parameters, &best.starts, REST),
         None => state.clone(),
     };
-    let (gain, deviation) =
-        if done.effects.len() == effects.len() { difference(windows, state, &done) } else { (0.0, 1.0) };
+    let (gain, z) =
+        if done.effects.len() == effects.len() { difference(windows, state, &done) } else { (0.0, 0.0) };
     let own = done.of(effect).unwrap_or(&[]);
     let relative_size = relative_size(engine, effect, own);
-    Refit { effect, gain, z: gain / deviation, relative_size, state: done }
+    Refit { effect, gain, z, relative_size, state: done }
 }
 
 /// The largest parameter over its size; of effects whose later parameters only place them, the first.
@@ -212,8 +223,15 @@ pub(crate) fn round(
     let mut order: Vec<&Screened> = screening.candidates.iter().collect();
     order.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let count = thresholds::REFITS[number.min(1)];
-    let mut refits: Vec<Refit> =
-        order.into_iter().take(count).map(|s| refit(engine, state, s, windows, &[])).collect();
+    let top = order.first().map_or(0.0, |s| s.gain);
+    let worth = (thresholds::WORTH_OF_BEST * top).max(thresholds::WORTH_OF_COST * state.cost);
+    let mut refits: Vec<Refit> = order
+        .into_iter()
+        .take(count)
+        .enumerate()
+        .filter(|(i, s)| *i == 0 || s.gain > worth)
+        .map(|(_, s)| refit(engine, state, s, windows, &[]))
+        .collect();
     for &effect in left.iter().filter(|e| e.spec().flat_at_null) {
         let n = effect.spec().parameters.len();
         let blank = Screened { effect, gain: 0.0, step: vec![0.0; n], error: vec![f64::INFINITY; n] };
@@ -234,16 +252,11 @@ pub(crate) fn round(
         }
     }
     for r in &mut refits {
-        let (gain, deviation) = difference(windows, &before, &r.state);
-        r.gain = gain;
-        r.z = gain / deviation;
+        (r.gain, r.z) = difference(windows, &before, &r.state);
     }
     let lead_z = refits
         .iter()
-        .map(|r| {
-            let (d, deviation) = difference(windows, &r.state, &refits[0].state);
-            d / deviation
-        })
+        .map(|r| difference(windows, &r.state, &refits[0].state).1)
         .collect();
     let taken = refits
         .iter()
@@ -273,11 +286,10 @@ fn prefer_simple(refits: &mut [Refit]) {
 
 /// Whether the best candidate is real, big enough to matter, and closes enough of what remains.
 fn acceptable(r: &Refit, before: &State, number: usize) -> bool {
-    let dof = before.fit.as_ref().map_or(1.0, |f| f.linearization.residuals as f64);
-    // What the weighted cost would be without any gap is unknown; half the residuals is a low guess, as weights hold a share of the misfit.
-    let remaining = (before.cost - 0.3 * dof).max(0.1 * before.cost);
-    let share = r.gain / remaining.max(1e-9);
+    let residuals = before.residuals();
+    let remaining = (before.cost - thresholds::NOISE_COST * residuals).max(0.05 * before.cost);
     r.z > thresholds::LEAST_Z
-        && share > thresholds::LEAST_SHARE[number.min(1)]
+        && r.gain > thresholds::LEAST_GAIN * residuals
+        && r.gain > thresholds::LEAST_SHARE[number.min(1)] * remaining
         && r.relative_size > thresholds::LEAST_SIZE
 }

@@ -23,7 +23,7 @@ pub(crate) struct Budget {
 
 /// Excess of the retuned model over the noise below which there is no gap to explain: slow sensor noise and the background that any real car
 /// has against a single-track model.
-const SMALL_EXCESS: f64 = 1.0;
+const SMALL_EXCESS: f64 = 0.3;
 /// Share of what could be explained at all that the named effects must explain.
 const LEAST_EXPLAINED: f64 = 0.5;
 /// Excess of the nominal over the retuned model that makes it a retune.
@@ -73,10 +73,12 @@ pub(crate) fn decide(budget: &Budget, rounds: &[Round], state: &State) -> (Verdi
     let mut reasons = vec![format!(
         "mean squared rollout error over noise: {nominal:.2} nominal, {retuned:.2} with retuned tires, {after:.2} with the effects, {ceiling:.2} with flexible terms, 1 is noise"
     )];
+    let weighted = rounds.last().map_or(f64::INFINITY, |r| r.before.cost / r.before.residuals());
+    let small = weighted < thresholds::SMALL_COST;
     let excess = retuned - 1.0;
     if state.effects.is_empty() {
         let best = rounds.first().and_then(|r| r.refits.first());
-        if excess < SMALL_EXCESS {
+        if small || excess < SMALL_EXCESS {
             let retune = nominal - retuned > RETUNE_EXCESS;
             reasons.push("what is left after retuning the tires is within noise and the usual imperfection of the model".to_owned());
             return (if retune { Verdict::TireRetuneOnly } else { Verdict::NoGap }, reasons);
@@ -91,7 +93,7 @@ pub(crate) fn decide(budget: &Budget, rounds: &[Round], state: &State) -> (Verdi
     let possible = (retuned - ceiling).max(1e-9);
     let explained = (retuned - after) / possible;
     reasons.push(format!("the named effects explain {:.0} % of what could be explained", 100.0 * explained));
-    if explained < LEAST_EXPLAINED && after - 1.0 > SMALL_EXCESS {
+    if explained < LEAST_EXPLAINED && !small && after - 1.0 > SMALL_EXCESS {
         reasons.push("that is too little: the cause is not, or not only, in the library".to_owned());
         return (Verdict::NoneOfThese, reasons);
     }

@@ -1,0 +1,196 @@
+//! Every effect of the library on the reference car, one after the other: what the diagnosis says of it.
+//!
+//!     cargo run --release -p gripsight_gap --example effect_table -- [--car NAME] [--out FOLDER] [EFFECT...]
+//!
+//! Writes FOLDER/effects_CAR.csv and FOLDER/effects_CAR.md. The tires are taken from a reference drive without the effect. Seeds
+//! are those of development: thresholds were fixed on them.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::Context;
+use gripsight_gap::{Diagnosis, EffectId, Request, diagnose};
+use gripsight_reference_car::{
+    CarParameters, Course, DriverKind, EffectSetting, Friction, Scenario, SensorSample, Simulation,
+};
+use gripsight_signals::{
+    AlignConfig, Aligner, DriveSample, ImuSample, Measurement, OdometrySample, StateSequence, TelemetrySample,
+};
+use gripsight_vehicle::VehicleParameters;
+
+const DURATION_S: f64 = 60.0;
+const MU: f64 = 0.95;
+
+fn main() -> anyhow::Result<()> {
+    let mut car_name = "formula_student".to_owned();
+    let mut out: Option<PathBuf> = None;
+    let mut names: Vec<String> = Vec::new();
+    let mut arguments = std::env::args().skip(1);
+    while let Some(a) = arguments.next() {
+        match a.as_str() {
+            "--car" => car_name = arguments.next().context("--car needs a name")?,
+            "--out" => out = Some(arguments.next().context("--out needs a folder")?.into()),
+            _ => names.push(a),
+        }
+    }
+    if names.is_empty() {
+        names.push("none".to_owned());
+        names.extend(EffectId::ALL.iter().map(|e| e.name().to_owned()));
+    }
+    let car = CarParameters::by_name(&car_name)?;
+    let reference = drive(&car, None, 11)?;
+    let vehicle = nominal(&car);
+    let mut csv = String::from("car,effect,true_size,verdict,named,confused_with,size,low,high,closed,nominal,retuned,after,ceiling,confidence,time_s\n");
+    for name in &names {
+        let recording = match drive(&car, (name != "none").then_some(name.as_str()), 12) {
+            Ok(r) => r,
+            Err(e) => {
+                println!("{name}: {e}");
+                continue;
+            }
+        };
+        let started = Instant::now();
+        let request = Request {
+            sequence: &recording,
+            held_out: None,
+            reference: Some(&reference),
+            vehicle: &vehicle,
+            tires: None,
+            without: &[],
+            only: &[],
+        };
+        match diagnose(&request, &mut |_| {}) {
+            Ok(d) => {
+                let line = row(&car, name, &d, started.elapsed().as_secs_f64());
+                print!("{line}");
+                csv.push_str(&line);
+            }
+            Err(e) => println!("{name}: {e}"),
+        }
+    }
+    if let Some(folder) = out {
+        std::fs::create_dir_all(&folder)?;
+        std::fs::write(folder.join(format!("effects_{car_name}.csv")), &csv)?;
+        std::fs::write(folder.join(format!("effects_{car_name}.md")), markdown(&car_name, &csv))?;
+    }
+    Ok(())
+}
+
+/// One lap after the other on the club track, with steering dither.
+fn drive(car: &CarParameters, effect: Option<&str>, seed: u64) -> anyhow::Result<StateSequence> {
+    let mut scenario = Scenario::new(car.clone())
+        .course(Course::by_name("club", car, false)?)
+        .driver(DriverKind::Profile, 0.88)
+        .dither(0.02)
+        .friction(Friction::Uniform { mu: MU })
+        .duration(DURATION_S)
+        .seed(seed);
+    if let Some(text) = effect {
+        scenario = scenario.effect(EffectSetting::parse(text)?);
+    }
+    let recording = Simulation::new(scenario)?.run(|_| {});
+    anyhow::ensure!(recording.end.is_completed(), "the drive ended early: {}", recording.end);
+    let mut aligner = Aligner::new(AlignConfig::default());
+    let mut samples: Vec<TelemetrySample> = Vec::new();
+    for sample in &recording.samples {
+        aligner.push(measurement(sample))?;
+        samples.extend(std::iter::from_fn(|| aligner.poll()));
+    }
+    samples.extend(std::iter::from_fn(|| aligner.drain()));
+    Ok(StateSequence::from_samples(&samples)?)
+}
+
+fn measurement(sample: &SensorSample) -> Measurement {
+    let stamp_ns = (sample.stamp_s() * 1e9).round() as i64;
+    match sample {
+        SensorSample::Odometry(s) => Measurement::Odometry(OdometrySample {
+            stamp_ns,
+            x_m: s.x_m,
+            y_m: s.y_m,
+            yaw_rad: s.heading_rad,
+            v_x_mps: s.v_x_mps,
+            v_y_mps: s.v_y_mps,
+            yaw_rate_radps: s.yaw_rate_radps,
+        }),
+        SensorSample::Drive(s) => Measurement::Drive(DriveSample {
+            stamp_ns,
+            steering_angle_rad: s.steering_rad,
+            speed_mps: s.speed_mps,
+            acceleration_mps2: s.acceleration_mps2,
+        }),
+        SensorSample::Imu(s) => Measurement::Imu(ImuSample {
+            stamp_ns,
+            a_x_mps2: s.a_x_mps2,
+            a_y_mps2: s.a_y_mps2,
+            yaw_rate_radps: s.yaw_rate_radps,
+        }),
+        SensorSample::Wheels(s) => Measurement::Wheels(gripsight_signals::WheelsSample {
+            stamp_ns,
+            speed: s.wheel_radps,
+            effort_nm: None,
+        }),
+    }
+}
+
+fn nominal(car: &CarParameters) -> VehicleParameters {
+    VehicleParameters {
+        name: Some(car.name.clone()),
+        mass_kg: car.mass_kg,
+        yaw_inertia_kgm2: car.yaw_inertia_kgm2,
+        l_f_m: car.l_f_m,
+        l_r_m: car.l_r_m,
+        h_cg_m: car.h_cg_m,
+        drive_front_share: car.drive.drive_front_share,
+        brake_front_share: car.drive.brake_front_share,
+        max_steering_rad: car.max_steering_rad,
+        wheel_radius_m: Some(car.drive.wheel_radius_m),
+    }
+}
+
+fn row(car: &CarParameters, text: &str, d: &Diagnosis, time_s: f64) -> String {
+    let name = text.split('=').next().unwrap_or(text);
+    let truth = gripsight_reference_car::effect_spec(name)
+        .map(|spec| {
+            let p = &spec.parameters[0];
+            let typical = if car.wheelbase_m() < 1.0 { p.typical_small } else { p.typical };
+            text.split_once('=').and_then(|(_, v)| v.parse().ok()).unwrap_or(typical)
+        })
+        .unwrap_or(0.0);
+    let named: Vec<&str> = d.effects.iter().filter(|e| e.accepted).map(|e| e.name).collect();
+    let own = d.effects.iter().find(|e| e.name == name).or(d.effects.first());
+    let first = own.and_then(|e| {
+        let preferred = gripsight_reference_car::effect_spec(name).ok().map(|s| s.parameters[0].name);
+        preferred.and_then(|n| e.parameters.get(n)).or(e.parameters.values().next())
+    });
+    let (size, low, high) = first.map_or((f64::NAN, f64::NAN, f64::NAN), |p| (p.value, p.low, p.high));
+    let confused = d.effects.first().map(|e| e.confused_with.join(" ")).unwrap_or_default();
+    let mut line = String::new();
+    let _ = writeln!(
+        line,
+        "{},{text},{truth},{},{},{confused},{size:.5},{low:.5},{high:.5},{:.3},{:.2},{:.2},{:.2},{:.2},{:.2},{time_s:.1}",
+        car.name,
+        d.verdict.name(),
+        named.join(" "),
+        d.gap_closed_fraction.value,
+        d.gap.nominal.value,
+        d.gap.retuned.value,
+        d.gap.after.value,
+        d.gap.unstructured_ceiling.value,
+        d.effects.first().map_or(0.0, |e| e.confidence)
+    );
+    line
+}
+
+fn markdown(car: &str, csv: &str) -> String {
+    let mut out = format!(
+        "# Every effect on the {car}\n\nReference car, club track, {DURATION_S} s, steering dither, typical size; tires from a reference drive. One row per effect.\n\n"
+    );
+    for (i, line) in csv.lines().enumerate() {
+        let _ = writeln!(out, "| {} |", line.replace(',', " | "));
+        if i == 0 {
+            let _ = writeln!(out, "|{}", " --- |".repeat(line.matches(',').count() + 1));
+        }
+    }
+    out
+}
