@@ -22,6 +22,40 @@ fn main() -> anyhow::Result<()> {
             }
             continue;
         }
+        if let Some(spec) = arg.strip_prefix("ref:") {
+            let f: Vec<&str> = spec.split(':').collect();
+            let run =
+                support::reference_run(f[0], f[1], f[2].parse()?, f[3].parse()?, f[4].parse()?, f.len() > 5);
+            let o = identify(&run.sequence, &run.vehicle, prior, None, &config, &mut |_| {})?;
+            let (a, b) = (support::floor(&run.truth.front)?, support::floor(&run.truth.rear)?);
+            let s = support::score(&o.phi_p, &run.truth);
+            let g = o.signals.to_array().map(|v| (v * 1e4).round() / 1e4);
+            println!(
+                "{} acc {} {:?} ratio {:.3} {:.3} score {:.4} {:.4} signals {:?} relax {:?} slip {:.3} {:.3} reached {} {} noise {:?} roll {:.3}",
+                run.name,
+                o.accepted,
+                o.source,
+                s[0] / a.1,
+                s[1] / b.1,
+                s[0],
+                s[1],
+                g,
+                o.nuisance,
+                o.slip_range_rad.front.high,
+                o.slip_range_rad.rear.high,
+                o.peak_friction.front.reached,
+                o.peak_friction.rear.reached,
+                o.rmse.noise,
+                o.rmse.rollout.after
+            );
+            println!(
+                "   phi {:?} floor {:?} {:?}",
+                o.phi_p.to_array().map(|v| (v * 1e2).round() / 1e2),
+                a.0,
+                b.0
+            );
+            continue;
+        }
         let folder = std::path::Path::new(&arg);
         let truth = folder
             .join("truth_axle_forces.csv")
@@ -74,7 +108,7 @@ fn main() -> anyhow::Result<()> {
         }
         println!(
             "\n  relax {:?} rmse one {:?}\n  roll {:?} noise {:?}",
-            o.relaxation_m, o.rmse.one_step, o.rmse.rollout, o.rmse.noise
+            o.nuisance, o.rmse.one_step, o.rmse.rollout, o.rmse.noise
         );
         for t in &o.history {
             println!(

@@ -5,6 +5,8 @@ use std::fmt;
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 use serde::{Deserialize, Serialize};
 
+use crate::Nuisance;
+
 /// An estimate with its 90 % interval; ends that are not known are NaN (null in JSON).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimate {
@@ -183,7 +185,7 @@ pub struct FrictionPrior {
     pub sigma: f64,
 }
 
-/// A set that was accepted: where a later run starts, what it has to beat, and what a monitor watches.
+/// A set that was accepted: where a later run starts, what it has to beat, and what a [`Monitor`](crate::Monitor) watches.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AcceptedSet {
     /// The car that it belongs to.
@@ -194,6 +196,8 @@ pub struct AcceptedSet {
     pub phi_p: PacejkaParameters,
     /// The signals' corrections that go with them.
     pub corrections: SignalCorrections,
+    /// What the fit allowed for beside them.
+    pub nuisance: Nuisance,
     /// Root mean square error of held-out rollouts: v_y in m/s, yaw rate in rad/s.
     pub rollout_rmse: [f64; 2],
     /// Whether the peak was reached.

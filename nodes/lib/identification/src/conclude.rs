@@ -12,8 +12,8 @@ use crate::picture::{curves, trace};
 use crate::rollout::{NAMES, PARAMETERS, SIGNALS, TireRollout, vector_of};
 use crate::tires::on_bound;
 use crate::{
-    Change, Config, Estimate, FrictionPrior, HorizonError, Identification, Outcome, PeakFriction, PerAxle,
-    Range, Rmse, RmseReport, RunKey, SignalCorrections, SignalEstimates, Source, Trace, WeakSignal,
+    Change, Config, Estimate, FrictionPrior, HorizonError, Identification, Nuisance, Outcome, PeakFriction,
+    PerAxle, Range, Rmse, RmseReport, RunKey, SignalCorrections, SignalEstimates, Source, Trace, WeakSignal,
 };
 
 /// The residual loop has to beat the direct fit on the validation part by this share: of near equals the simpler wins.
@@ -64,7 +64,7 @@ pub(crate) fn refused(
         signals: SignalCorrections::NONE,
         signal_intervals: SignalEstimates::from_array([unknown; 6]),
         weak_signals: Vec::new(),
-        relaxation_m: f64::NAN,
+        nuisance: Nuisance { relaxation_m: f64::NAN, combined_slip: f64::NAN },
         rmse: RmseReport { one_step: rmse, rollout: rmse, horizon_s: f64::NAN, noise: [f64::NAN; 2] },
         rollout_error: Vec::new(),
         source: Source::Start,
@@ -90,9 +90,9 @@ pub(crate) fn conclude(run: &Identification, converged: bool) -> Outcome {
     let rollout = TireRollout::new(&run.vehicle, &run.data);
     let test = run.data.part(Part::Test);
     let noise = run.direct.scatter;
-    let after = vector_of(&phi_p, &corrections, run.direct.relaxation_m);
+    let after = vector_of(&phi_p, &corrections, &run.direct.nuisance);
     let before_corrections = run.previous.as_ref().map_or(SignalCorrections::NONE, |p| p.corrections);
-    let before = vector_of(&run.initial, &before_corrections, run.direct.relaxation_m);
+    let before = vector_of(&run.initial, &before_corrections, &run.direct.nuisance);
     let rmse = |errors: fn(
         &TireRollout<'_>,
         &[f64; PARAMETERS],
@@ -129,7 +129,7 @@ pub(crate) fn conclude(run: &Identification, converged: bool) -> Outcome {
         signals: corrections,
         signal_intervals: signal_intervals(run),
         weak_signals: weak_signals(run),
-        relaxation_m: run.direct.relaxation_m,
+        nuisance: run.direct.allowed,
         rmse: RmseReport {
             one_step: rmse(one_step_errors),
             rollout: rmse(rollout_errors),
@@ -162,9 +162,10 @@ fn choose(run: &Identification) -> (PacejkaParameters, Source) {
         return (last(), Source::ResidualLoop);
     }
     let best = run.history.iter().min_by(|a, b| a.validation_rmse.total_cmp(&b.validation_rmse));
-    let direct = run.validation_error(&run.direct.tires);
     match best {
-        Some(turn) if !run.config.direct_start || turn.validation_rmse < (1.0 - LOOP_GAIN) * direct => {
+        Some(turn)
+            if !run.config.direct_start || turn.validation_rmse < (1.0 - LOOP_GAIN) * run.direct_error =>
+        {
             (turn.phi_p, Source::ResidualLoop)
         }
         _ => (run.direct.tires, Source::LeastSquares),

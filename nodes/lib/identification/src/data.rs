@@ -50,7 +50,7 @@ const SLOW_MPS: f64 = 0.5;
 /// Half the length of the lines that give the derivative of v_x.
 const SLOPE_HALF_S: f64 = 0.1;
 /// Fewest windows to fit anything to.
-const MIN_WINDOWS: usize = 12;
+pub(crate) const MIN_WINDOWS: usize = 12;
 
 impl Data {
     /// # Errors
@@ -59,6 +59,7 @@ impl Data {
         sequence: &StateSequence,
         vehicle: &VehicleParameters,
         health: &DataHealth,
+        min_windows: usize,
     ) -> Result<Self, IdentificationError> {
         vehicle.clone().checked()?;
         let used = ["v_x_mps", "v_y_mps", "yaw_rate_radps"];
@@ -89,11 +90,11 @@ impl Data {
             .enumerate()
             .map(|(i, w)| (w, PATTERN[i / per_block % PATTERN.len()]))
             .collect();
-        if windows.len() < MIN_WINDOWS {
+        if windows.len() < min_windows {
             return Err(IdentificationError::TooLittle {
                 what: "driving time in s without stops and gaps",
                 got: windows.len() as f64 * len as f64 * dt_s,
-                needed: MIN_WINDOWS as f64 * len as f64 * dt_s,
+                needed: min_windows as f64 * len as f64 * dt_s,
                 drive: "drive some laps without stopping",
             });
         }

@@ -15,9 +15,11 @@ use nalgebra::{DMatrix, DVector};
 use gripsight_vehicle::{GRAVITY_MPS2, MagicFormula, PacejkaParameters, SingleTrack, VehicleParameters};
 
 use crate::data::{Data, Part, median, quantile};
+use crate::extract::extract;
 use crate::judge::rollout_errors;
-use crate::rollout::{RELAXATION, SIGNALS, TireRollout, corrections_of, tires_of};
+use crate::rollout::{Nuisance, SIGNALS, TireRollout, corrections_of, nuisance_of, tires_of};
 use crate::shooting::{Fit, Parameter, Prior, Problem, Rollout, StopReason, Window, fit};
+use crate::sweep::Point;
 use crate::tires::{C_PRIOR, E_PRIOR, parameters};
 use crate::{FrictionPrior, IdentificationError, PerAxle, Range, SignalCorrections};
 
@@ -39,6 +41,8 @@ const SIGNAL_PRIORS: [(f64, f64, f64, f64); 6] = [
 
 /// Relaxation length in wheelbases: mean, sigma, low, high.
 const RELAXATION_SHARES: [f64; 4] = [0.12, 0.1, 0.005, 0.6];
+/// Share of the friction ellipse: mean, sigma, low, high.
+const COMBINED_SLIP: [f64; 4] = [0.8, 0.3, 0.0, 1.3];
 /// Steering delays that step 1 starts from, s.
 const DELAY_STARTS_S: [f64; 4] = [0.01, 0.06, 0.14, 0.3];
 /// Robustness of the window loss, in noises.
@@ -56,8 +60,10 @@ pub(crate) struct Direct {
     pub(crate) corrections: SignalCorrections,
     /// The last fit, for intervals.
     pub(crate) fit: Fit,
-    /// Relaxation length of the tires that the fit allowed for.
-    pub(crate) relaxation_m: f64,
+    /// What the fit allowed for beside the tires.
+    pub(crate) allowed: Nuisance,
+    /// The same as rollouts with [`Self::tires`] need it: what combined slip takes is in the tires already.
+    pub(crate) nuisance: Nuisance,
     /// Standard errors of the signal corrections.
     pub(crate) signal_errors: [Option<f64>; 6],
     /// What was held likely of them before the data were looked at.
@@ -114,7 +120,7 @@ pub(crate) fn direct(
     restart(&mut all, &start.parameters);
     let (mut all, mut found, weights) = fitter.signals(&all, weights);
 
-    let slips = fitter.visited(&found);
+    let (slips, _) = fitter.visited(&found);
     let peak = PerAxle { front: evidence(&found, 0, &slips.front), rear: evidence(&found, 4, &slips.rear) };
     if let Some(prior) = prior.filter(|_| !(peak.front.reached && peak.rear.reached)) {
         restart(&mut all, &found.parameters);
@@ -138,11 +144,18 @@ pub(crate) fn direct(
         open[j].free = true;
     }
     let errors = fitter.solve(&open, &fitter.training, &weights.sigma, 0);
-    let slips = fitter.visited(&found);
+    let (slips, points) = fitter.visited(&found);
+    let allowed = nuisance_of(&found.parameters);
+    let fitted = tires_of(&found.parameters);
+    let held = |reached: bool| prior.is_some() && !reached;
     Ok(Direct {
-        tires: tires_of(&found.parameters),
+        tires: PacejkaParameters {
+            front: nearest(&points.front, &fitted.front, held(peak.front.reached))?,
+            rear: nearest(&points.rear, &fitted.rear, held(peak.rear.reached))?,
+        },
         corrections: corrections_of(&found.parameters),
-        relaxation_m: found.parameters[RELAXATION],
+        nuisance: Nuisance { combined_slip: 0.0, ..allowed },
+        allowed,
         signal_errors: std::array::from_fn(|j| match errors.standard_error(SIGNALS + j) {
             // The yaw rate's bias was known from the heading.
             None if j == 5 => Some(signal_priors[5].sigma),
@@ -156,13 +169,15 @@ pub(crate) fn direct(
     })
 }
 
+/// The nearest Magic Formula is fitted to about this many points.
+const NEAREST_POINTS: usize = 600;
 /// Place of the steering gain.
 const GAIN: usize = SIGNALS + 1;
 /// Place of the lever arm of v_y.
 const LEVER: usize = SIGNALS + 3;
 /// Freeing gain or lever arm has to lower the error of the validation part by this share, or they stay at their nominal values: a model that is
 /// too simple would use them to mend what is not theirs.
-const WORTH: f64 = 0.03;
+const WORTH: f64 = 0.05;
 
 struct Fitter<'a> {
     model: TireRollout<'a>,
@@ -243,24 +258,38 @@ impl Fitter<'_> {
         (all, fit, weights)
     }
 
-    /// Slip angles along the fitted trajectories.
-    fn visited(&self, fit: &Fit) -> PerAxle<Slips> {
-        let mut slips = PerAxle { front: Vec::new(), rear: Vec::new() };
+    /// Slip angles, and F_y/F_z at them, along the fitted trajectories.
+    fn visited(&self, fit: &Fit) -> (PerAxle<Slips>, PerAxle<Vec<Point>>) {
+        let mut points = PerAxle { front: Vec::new(), rear: Vec::new() };
         let car = SingleTrack::new(self.model.vehicle, &tires_of(&fit.parameters));
         for (window, start) in self.training.iter().zip(&fit.starts) {
-            self.model.trajectory(&fit.parameters, *start, window, |state, input| {
-                let (front, rear) = car.slip_angles_rad(state, input);
-                slips.front.push(front);
-                slips.rear.push(rear);
+            self.model.trajectory(&fit.parameters, *start, window, |at| {
+                let (front, rear) = car.slip_angles_rad(&at.state, &at.input);
+                let forces = at.normalized_forces(&fit.parameters);
+                points.front.push(Point { slip_rad: front, force: forces.0 });
+                points.rear.push(Point { slip_rad: rear, force: forces.1 });
             });
         }
-        slips.map(|samples_rad| {
+        let slips = |points: &[Point]| {
+            let samples_rad: Vec<f64> = points.iter().map(|p| p.slip_rad).collect();
             let mut sorted = samples_rad.clone();
             let low = quantile(&mut sorted, 0.005).unwrap_or(f64::NAN);
             let high = quantile(&mut sorted, 0.995).unwrap_or(f64::NAN);
             Slips { samples_rad, range_rad: Range { low, high } }
-        })
+        };
+        (PerAxle { front: slips(&points.front), rear: slips(&points.rear) }, points)
     }
+}
+
+/// The Magic Formula nearest to the forces of the richer model, over the slips driven: what Phi_p is for, a model without relaxation and combined slip.
+fn nearest(
+    points: &[Point],
+    start: &MagicFormula,
+    hold_d: bool,
+) -> Result<MagicFormula, IdentificationError> {
+    let every = points.len().div_ceil(NEAREST_POINTS).max(1);
+    let thin: Vec<Point> = points.iter().copied().step_by(every).collect();
+    Ok(extract(&thin, start, hold_d, true)?.axle)
 }
 
 /// The signal parameters with their priors, scaled to the car.
@@ -283,6 +312,8 @@ fn signal_parameters(data: &Data, vehicle: &VehicleParameters) -> Vec<Parameter>
         all[5].free = false;
     }
     let [mean, sigma, low, high] = RELAXATION_SHARES.map(|share| share * vehicle.wheelbase_m());
+    all.push(Parameter { start: mean, low, high, free: true, prior: Some(Prior { mean, sigma }) });
+    let [mean, sigma, low, high] = COMBINED_SLIP;
     all.push(Parameter { start: mean, low, high, free: true, prior: Some(Prior { mean, sigma }) });
     all
 }

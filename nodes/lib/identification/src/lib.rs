@@ -1,7 +1,7 @@
 //! From a state sequence to Pacejka parameters: signal corrections, residual learning, virtual steering sweep, fit, acceptance.
 //!
 //! [`identify`] is the whole way; [`Identification`] and [`train_residual`] are its halves, which run in two nodes when live.
-//! [`shooting`] is the least-squares engine underneath.
+//! [`shooting`] is the least-squares engine underneath; [`Monitor`] says when a set in use stops fitting.
 
 mod acceptance;
 mod candidate;
@@ -13,6 +13,7 @@ mod error;
 pub mod export;
 mod extract;
 mod judge;
+mod monitor;
 pub mod nelder_mead;
 mod outcome;
 mod picture;
@@ -29,10 +30,12 @@ pub use candidate::{
 };
 pub use config::{Config, Method, ResidualKind};
 pub use error::IdentificationError;
+pub use monitor::{Monitor, Reading};
 pub use outcome::{
     Change, HorizonError, IterationRecord, Outcome, PeakFriction, Rmse, RmseReport, SignalEstimates, Source,
     TireCurve, Trace, WeakSignal,
 };
 pub use residual::train_residual;
 pub use residual_model::{INPUTS, OUTPUTS, ResidualModel};
+pub use rollout::Nuisance;
 pub use run::{Identification, Next, Stage, Started, identify};

@@ -4,7 +4,9 @@ use gripsight_signals::DataHealth;
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 use serde::Serialize;
 
-use crate::{AcceptedSet, Config, Estimate, FrictionPrior, PerAxle, Range, RunKey, SignalCorrections};
+use crate::{
+    AcceptedSet, Config, Estimate, FrictionPrior, Nuisance, PerAxle, Range, RunKey, SignalCorrections,
+};
 
 /// Peak friction of one axle, and what the value rests on.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -205,7 +207,8 @@ pub struct Outcome {
     pub peak_friction: PerAxle<PeakFriction>,
     /// Turns of the outer loop taken.
     pub iterations: u32,
-    /// Whether the last turn changed the tire curves by less than the tolerance.
+    /// Whether the last turn changed the tire curves by less than the tolerance, or (robust method) the last two no longer predict held-out data
+    /// better than what was there before them.
     pub converged: bool,
     /// Whether the set may be used.
     pub accepted: bool,
@@ -223,8 +226,8 @@ pub struct Outcome {
     pub signal_intervals: SignalEstimates,
     /// Corrections that rest on their priors.
     pub weak_signals: Vec<WeakSignal>,
-    /// Relaxation length of the tires that the direct fit allowed for.
-    pub relaxation_m: f64,
+    /// What the direct fit allowed for beside the tires.
+    pub nuisance: Nuisance,
     /// Errors on held-out data.
     pub rmse: RmseReport,
     /// Rollout error over its horizon.
@@ -267,6 +270,7 @@ impl Outcome {
             sequence_id: self.key.sequence_id,
             phi_p: self.phi_p,
             corrections: self.signals,
+            nuisance: Nuisance { combined_slip: 0.0, ..self.nuisance },
             rollout_rmse: [self.rmse.rollout.v_y_mps.after, self.rmse.rollout.yaw_rate_radps.after],
             peak_reached: self.peak_friction.map(|p| p.reached),
         })

@@ -67,7 +67,7 @@ pub(crate) fn trace(run: &Identification, before: &[f64; PARAMETERS], after: &[f
         model.rollout(before, start_before, window, &mut old);
         model.rollout(after, start_after, window, &mut new);
         states.clear();
-        model.trajectory(after, start_after, window, |x, u| states.push((*x, *u)));
+        model.trajectory(after, start_after, window, |at| states.push((at.state, at.input)));
         let s = &model.segments[window.segment];
         for (i, k) in (window.from..window.from + window.len).enumerate() {
             let next = (k + 1).min(s.len() - 1);

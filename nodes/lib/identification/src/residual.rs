@@ -16,7 +16,7 @@ use gripsight_vehicle::{Input, MagicFormula, PacejkaParameters, SingleTrack, Sta
 use nalgebra::{Const, Matrix4, Vector4};
 use num_dual::DualSVec;
 
-use crate::data::{Data, Part, quantile};
+use crate::data::{Data, MIN_WINDOWS, Part, quantile};
 use crate::rollout::{delayed, substep_s};
 use crate::shooting::Window;
 use crate::{
@@ -68,7 +68,7 @@ pub fn train_residual(
     if !candidate.phi_p.is_finite() {
         return Err(IdentificationError::NotFinite { what: "tires of the candidate" });
     }
-    let data = Data::new(sequence, vehicle, &DataHealth::of(sequence)?)?;
+    let data = Data::new(sequence, vehicle, &DataHealth::of(sequence)?, MIN_WINDOWS)?;
     let car = SingleTrack::new(vehicle, &candidate.phi_p);
     let (stretches, dt_s, horizon) = match config.method {
         Method::Paper => (one_step(&data, &car, candidate), data.dt_s, 1),

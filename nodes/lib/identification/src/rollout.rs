@@ -3,23 +3,31 @@
 //! Beyond [`SingleTrack`] it shifts load between the axles as the car brakes and accelerates, F_zf = F_zf0 - m a_x h/L, from the known height of
 //! the centre of gravity: F_y/F_z is the tires' own only with the load that was on them. And the slip that makes the force follows the slip of
 //! the axle over a relaxation length, d(alpha')/dt = (alpha - alpha') v_x/sigma: without it the lag of a real tire reads as stiffness, delay and lever arm.
+//! And driving and braking take from the lateral force along the friction ellipse, F_y sqrt(1 - (k F_x/(D F_z))^2), F_x from the acceleration and the
+//! known split of drive and brake.
+//!
+//! Relaxation length and k are nuisances of the estimation, not results: Phi_p goes to models that have neither.
 
 use gripsight_signals::Segment;
 use gripsight_vehicle::{
     GRAVITY_MPS2, Input, MagicFormula, PacejkaParameters, Real, SingleTrack, State, VehicleParameters,
 };
 
+use serde::{Deserialize, Serialize};
+
 use crate::SignalCorrections;
 use crate::data::Data;
 use crate::shooting::{Rollout, Window};
 
 /// Number of parameters of [`TireRollout`]: (k, C, D, E) front and rear with k = B C D, the
-/// signal corrections, and the tires' relaxation length.
-pub(crate) const PARAMETERS: usize = 15;
+/// signal corrections, the tires' relaxation length, and how much longitudinal force takes from the lateral.
+pub(crate) const PARAMETERS: usize = 16;
 /// Place of the first signal correction.
 pub(crate) const SIGNALS: usize = 8;
 /// Place of the relaxation length.
 pub(crate) const RELAXATION: usize = 14;
+/// Place of the share of combined slip.
+pub(crate) const COMBINED: usize = 15;
 /// Names of the parameters, with their units where they have one.
 pub(crate) const NAMES: [&str; PARAMETERS] = [
     "front.k",
@@ -37,7 +45,22 @@ pub(crate) const NAMES: [&str; PARAMETERS] = [
     "v_y_bias_mps",
     "yaw_rate_bias_radps",
     "relaxation_m",
+    "combined_slip",
 ];
+
+/// What the estimation allows for and Phi_p does not hold.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Nuisance {
+    /// Relaxation length of the tires.
+    pub relaxation_m: f64,
+    /// How much of the friction ellipse is at work: 0 none, 1 all.
+    pub combined_slip: f64,
+}
+
+/// Nuisances of a parameter vector.
+pub(crate) fn nuisance_of(p: &[f64]) -> Nuisance {
+    Nuisance { relaxation_m: p[RELAXATION], combined_slip: p[COMBINED] }
+}
 
 /// Predicts what the sensors report of v_y and yaw rate.
 #[derive(Debug, Clone, Copy)]
@@ -54,8 +77,41 @@ struct Drive<T> {
     input: Input<T>,
     /// Share of the front and of the rear static load that is on the axle.
     load: [f64; 2],
+    /// Longitudinal over vertical force of either axle.
+    pull: [f64; 2],
 }
 
+/// What a rollout shows at a sample.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Visit<T = f64> {
+    pub(crate) state: State<T>,
+    pub(crate) input: Input<T>,
+    /// Slips, front and rear, that make the force: behind those of the axles by the relaxation length.
+    slip_rad: (T, T),
+    pull: [f64; 2],
+}
+
+impl Visit {
+    /// F_y/F_z of the front and the rear axle, with what the longitudinal forces leave of them.
+    pub(crate) fn normalized_forces(&self, p: &[f64]) -> (f64, f64) {
+        let (tires, combined) = (tires_of(p), p[COMBINED]);
+        (
+            left_beside(&tires.front, combined, self.slip_rad.0, self.pull[0]),
+            left_beside(&tires.rear, combined, self.slip_rad.1, self.pull[1]),
+        )
+    }
+}
+
+/// F_y/F_z at a slip beside a longitudinal force.
+fn left_beside<T: Real>(tire: &MagicFormula<T>, combined: T, slip: T, pull: f64) -> T {
+    let used = combined * pull / tire.d;
+    let left = -(used * used) + 1.0;
+    let left = if left.re() > LEAST_LEFT { left.sqrt() } else { T::from(LEAST_LEFT.sqrt()) };
+    tire.normalized_force(slip) * left
+}
+
+/// Square of the share of the lateral force that is always left beside the longitudinal.
+const LEAST_LEFT: f64 = 0.1;
 /// An axle never loses more of its load than this in the model: beyond, wheels lift and the model ends.
 const LEAST_LOAD: f64 = 0.2;
 
@@ -64,13 +120,13 @@ impl<'a> TireRollout<'a> {
         Self { vehicle, segments: &data.segments, a_x_mps2: &data.a_x_mps2 }
     }
 
-    /// States and inputs, signals corrected, at every sample of a window.
+    /// Runs over a window, signals corrected, and shows every sample.
     pub(crate) fn trajectory<T: Real>(
         &self,
         p: &[T],
         start: [T; 2],
         window: &Window,
-        mut visit: impl FnMut(&State<T>, &Input<T>),
+        mut visit: impl FnMut(&Visit<T>),
     ) {
         let segment = &self.segments[window.segment];
         let car = SingleTrack::new(self.vehicle, &tires_of(p));
@@ -81,13 +137,13 @@ impl<'a> TireRollout<'a> {
             let shifted_n = transfer_kg * self.a_x_mps2[window.segment][k];
             let steering_rad =
                 delayed(&segment.steering_rad, k, delay_samples) * p[SIGNALS + 1] + p[SIGNALS + 2];
-            Drive {
-                input: Input { v_x_mps: T::from(segment.v_x_mps[k]), steering_rad },
-                load: [
-                    (1.0 - shifted_n / front_n).max(LEAST_LOAD),
-                    (1.0 + shifted_n / rear_n).max(LEAST_LOAD),
-                ],
-            }
+            let load =
+                [(1.0 - shifted_n / front_n).max(LEAST_LOAD), (1.0 + shifted_n / rear_n).max(LEAST_LOAD)];
+            let force_n = self.vehicle.mass_kg * self.a_x_mps2[window.segment][k];
+            let front =
+                if force_n > 0.0 { self.vehicle.drive_front_share } else { self.vehicle.brake_front_share };
+            let pull = [front * force_n / (front_n * load[0]), (1.0 - front) * force_n / (rear_n * load[1])];
+            Drive { input: Input { v_x_mps: T::from(segment.v_x_mps[k]), steering_rad }, load, pull }
         };
         let end = window.from + window.len;
         let slowest = segment.v_x_mps[window.from..end].iter().copied().fold(f64::INFINITY, f64::min);
@@ -104,7 +160,7 @@ impl<'a> TireRollout<'a> {
             + p[SIGNALS + 2];
         slip.0 += before - here.input.steering_rad;
         for k in window.from..end {
-            visit(&x, &here.input);
+            visit(&Visit { state: x, input: here.input, slip_rad: slip, pull: here.pull });
             if k + 1 == end {
                 break;
             }
@@ -115,13 +171,13 @@ impl<'a> TireRollout<'a> {
             for i in 0..substeps {
                 // The midpoint rule, inputs linear over the sample.
                 let at = here.towards(&next, i as f64 / substeps as f64);
-                let slope = self.derivative(&car, &x, &at, slip);
+                let slope = self.derivative(&car, p[COMBINED], &x, &at, slip);
                 let middle = moved(&x, &slope, 0.5 * h_s);
                 let at = here.towards(&next, (i as f64 + 0.5) / substeps as f64);
                 let target = car.slip_angles_rad(&middle, &at.input);
                 let follow =
                     |share: T| (slip.0 + (target.0 - slip.0) * share, slip.1 + (target.1 - slip.1) * share);
-                let slope = self.derivative(&car, &middle, &at, follow(half));
+                let slope = self.derivative(&car, p[COMBINED], &middle, &at, follow(half));
                 slip = follow(whole);
                 x = moved(&x, &slope, h_s);
             }
@@ -132,15 +188,17 @@ impl<'a> TireRollout<'a> {
     fn derivative<T: Real>(
         &self,
         car: &SingleTrack<T>,
+        combined: T,
         x: &State<T>,
         drive: &Drive<T>,
         slip: (T, T),
     ) -> State<T> {
         let (v, input) = (self.vehicle, &drive.input);
-        let front_n = car.front.normalized_force(slip.0)
+        let front_n = left_beside(&car.front, combined, slip.0, drive.pull[0])
             * (v.static_load_front_n() * drive.load[0])
             * input.steering_rad.cos();
-        let rear_n = car.rear.normalized_force(slip.1) * (v.static_load_rear_n() * drive.load[1]);
+        let rear_n = left_beside(&car.rear, combined, slip.1, drive.pull[1])
+            * (v.static_load_rear_n() * drive.load[1]);
         State {
             v_y_mps: (rear_n + front_n) / v.mass_kg - input.v_x_mps * x.yaw_rate_radps,
             yaw_rate_radps: (front_n * v.l_f_m - rear_n * v.l_r_m) / v.yaw_inertia_kgm2,
@@ -157,6 +215,7 @@ impl<T: Real> Drive<T> {
                     + (next.input.steering_rad - self.input.steering_rad) * share,
             },
             load: std::array::from_fn(|i| self.load[i] + (next.load[i] - self.load[i]) * share),
+            pull: std::array::from_fn(|i| self.pull[i] + (next.pull[i] - self.pull[i]) * share),
         }
     }
 }
@@ -178,14 +237,15 @@ pub(crate) fn tires_of<T: Real>(p: &[T]) -> PacejkaParameters<T> {
 pub(crate) fn vector_of(
     tires: &PacejkaParameters,
     corrections: &SignalCorrections,
-    relaxation_m: f64,
+    nuisance: &Nuisance,
 ) -> [f64; PARAMETERS] {
     let axle = |f: &MagicFormula| [f.normalized_stiffness(), f.c, f.d, f.e];
     let (front, rear, signals) = (axle(&tires.front), axle(&tires.rear), corrections.to_array());
     std::array::from_fn(|j| match j {
         0..4 => front[j],
         4..8 => rear[j - 4],
-        RELAXATION => relaxation_m,
+        RELAXATION => nuisance.relaxation_m,
+        COMBINED => nuisance.combined_slip,
         _ => signals[j - SIGNALS],
     })
 }
@@ -222,9 +282,9 @@ impl Rollout for TireRollout<'_> {
     fn rollout<T: Real>(&self, p: &[T], start: [T; 2], window: &Window, out: &mut Vec<T>) {
         out.clear();
         let [lever, v_y_bias, yaw_rate_bias] = [p[SIGNALS + 3], p[SIGNALS + 4], p[SIGNALS + 5]];
-        self.trajectory(p, start, window, |x, _| {
-            out.push(x.v_y_mps + lever * x.yaw_rate_radps + v_y_bias);
-            out.push(x.yaw_rate_radps + yaw_rate_bias);
+        self.trajectory(p, start, window, |at| {
+            out.push(at.state.v_y_mps + lever * at.state.yaw_rate_radps + v_y_bias);
+            out.push(at.state.yaw_rate_radps + yaw_rate_bias);
         });
     }
 

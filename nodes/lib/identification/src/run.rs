@@ -12,7 +12,7 @@ use gripsight_signals::{DataHealth, Excitation, StateSequence};
 use gripsight_vehicle::{MagicFormula, PacejkaParameters, VehicleParameters};
 
 use crate::conclude::{Request, conclude, refused};
-use crate::data::{Data, Part};
+use crate::data::{Data, MIN_WINDOWS, Part};
 use crate::direct::{Direct, direct};
 use crate::extract::extract;
 use crate::judge::rollout_errors;
@@ -75,6 +75,8 @@ pub struct Identification {
     pub(crate) config: Config,
     pub(crate) initial: PacejkaParameters,
     pub(crate) direct: Direct,
+    /// Error of the direct fit on the validation part, in noises.
+    pub(crate) direct_error: f64,
     /// Turns taken.
     pub(crate) history: Vec<IterationRecord>,
     pub(crate) candidate: Candidate,
@@ -114,7 +116,7 @@ impl Identification {
         if let Some(reason) = Excitation::of(sequence)?.insufficient {
             return Ok(refuse(reason, "drive corners both ways, at growing speed, for half a minute"));
         }
-        let data = match Data::new(sequence, vehicle, &health) {
+        let data = match Data::new(sequence, vehicle, &health, MIN_WINDOWS) {
             Err(error @ IdentificationError::TooLittle { drive, .. }) => {
                 return Ok(refuse(error.to_string(), drive));
             }
@@ -128,7 +130,7 @@ impl Identification {
         };
         let candidate =
             Candidate { key, phi_p, corrections: direct.corrections, mean_speed_mps: data.mean_speed_mps };
-        let run = Self {
+        let mut run = Self {
             data,
             vehicle: vehicle.clone(),
             prior,
@@ -136,10 +138,12 @@ impl Identification {
             config: config.clone(),
             initial,
             direct,
+            direct_error: f64::INFINITY,
             history: Vec::new(),
             candidate,
             ended: false,
         };
+        run.direct_error = run.validation_error(&run.direct.tires);
         Ok(Started::Running(Box::new(run)))
     }
 
@@ -169,15 +173,29 @@ impl Identification {
             return Err(IdentificationError::WrongModel { expected, got });
         }
         let turn = self.turn(model)?;
-        let converged = turn.change < self.config.tolerance;
+        let settled = turn.change < self.config.tolerance;
         self.candidate.phi_p = turn.phi_p;
         self.candidate.key.iteration = turn.iteration;
         self.history.push(turn);
+        let converged = settled || self.stalled();
         if converged || self.candidate.key.iteration >= self.config.max_iterations {
             self.ended = true;
             return Ok(Next::Done(Box::new(conclude(self, converged))));
         }
         Ok(Next::Candidate(self.candidate.clone()))
+    }
+
+    /// The robust method ends where the last turns no longer predict the validation part better than what was there before them.
+    fn stalled(&self) -> bool {
+        const TURNS: usize = 2;
+        let Some(before) = self.history.len().checked_sub(TURNS) else { return false };
+        if self.config.method == Method::Paper || !self.config.direct_start {
+            return false;
+        }
+        let errors =
+            |turns: &[IterationRecord]| turns.iter().map(|t| t.validation_rmse).fold(f64::INFINITY, f64::min);
+        let best = errors(&self.history[..before]).min(self.direct_error);
+        errors(&self.history[before..]) >= best
     }
 
     /// One turn of the outer loop.
@@ -211,7 +229,7 @@ impl Identification {
     pub(crate) fn validation_error(&self, tires: &PacejkaParameters) -> f64 {
         let rollout = TireRollout::new(&self.vehicle, &self.data);
         let windows = self.data.part(Part::Validation);
-        let p = vector_of(tires, &self.direct.corrections, self.direct.relaxation_m);
+        let p = vector_of(tires, &self.direct.corrections, &self.direct.nuisance);
         rollout_errors(&rollout, &p, &windows, &self.direct.scatter).normalized
     }
 }

@@ -11,21 +11,47 @@ use gripsight_vehicle::{MagicFormula, PacejkaParameters, VehicleParameters};
 
 /// True slips and normalised forces of an axle.
 #[derive(Debug, Clone, Default)]
-pub struct Truth {
-    pub slip_rad: Vec<f64>,
-    pub force: Vec<f64>,
+pub(crate) struct Truth {
+    pub(crate) slip_rad: Vec<f64>,
+    pub(crate) force: Vec<f64>,
 }
 
 /// A run with its truth.
-pub struct Run {
-    pub name: String,
-    pub vehicle: VehicleParameters,
-    pub sequence: StateSequence,
-    pub truth: PerAxle<Truth>,
+pub(crate) struct Run {
+    pub(crate) name: String,
+    pub(crate) vehicle: VehicleParameters,
+    pub(crate) sequence: StateSequence,
+    pub(crate) truth: PerAxle<Truth>,
+}
+
+#[path = "../../tests/identification/support.rs"]
+pub(crate) mod reference;
+
+/// A drive of the reference car with its truth: `CAR TRACK MU PACE SEED`, all background effects on if asked.
+pub(crate) fn reference_run(car: &str, track: &str, mu: f64, pace: f64, seed: u64, background: bool) -> Run {
+    let plain = reference::scenario(car, track, mu, pace, seed);
+    let scenario = if background { reference::with_background(plain) } else { plain };
+    let (recording, sequence, vehicle) = reference::drive(scenario);
+    let mut truth = PerAxle::<Truth>::default();
+    for t in &recording.truth {
+        let m = &t.motion;
+        if m.v_x_mps < 1.0 {
+            continue;
+        }
+        let (f, r) = (t.front_axle_n(), t.rear_axle_n());
+        truth
+            .front
+            .slip_rad
+            .push(m.steering_rad - ((m.v_y_mps + vehicle.l_f_m * m.yaw_rate_radps) / m.v_x_mps).atan());
+        truth.rear.slip_rad.push(-((m.v_y_mps - vehicle.l_r_m * m.yaw_rate_radps) / m.v_x_mps).atan());
+        truth.front.force.push(f[1] / f[2]);
+        truth.rear.force.push(r[1] / r[2]);
+    }
+    Run { name: format!("{car} {track} mu {mu} pace {pace} seed {seed}"), vehicle, sequence, truth }
 }
 
 /// The first window of a bag folder (`NAME/NAME.mcap`, `vehicle.yaml`).
-pub fn read(folder: &Path, length_s: f64) -> Result<(VehicleParameters, StateSequence)> {
+pub(crate) fn read(folder: &Path, length_s: f64) -> Result<(VehicleParameters, StateSequence)> {
     let name = folder.file_name().context("no folder")?.to_string_lossy().into_owned();
     let vehicle = VehicleParameters::from_ros_yaml(&std::fs::read_to_string(folder.join("vehicle.yaml"))?)?;
     let window = WindowConfig { length_s, hop_s: length_s };
@@ -34,7 +60,7 @@ pub fn read(folder: &Path, length_s: f64) -> Result<(VehicleParameters, StateSeq
 }
 
 /// A bag folder with `truth_axle_forces.csv`.
-pub fn read_with_truth(folder: &Path, length_s: f64) -> Result<Run> {
+pub(crate) fn read_with_truth(folder: &Path, length_s: f64) -> Result<Run> {
     let (vehicle, sequence) = read(folder, length_s)?;
     let mut truth = PerAxle::<Truth>::default();
     let mut csv = csv::Reader::from_path(folder.join("truth_axle_forces.csv"))?;
@@ -87,14 +113,14 @@ pub fn read_with_truth(folder: &Path, length_s: f64) -> Result<Run> {
 }
 
 /// Root mean square error of F_y/F_z of an axle.
-pub fn rmse(axle: &MagicFormula, truth: &Truth) -> f64 {
+pub(crate) fn rmse(axle: &MagicFormula, truth: &Truth) -> f64 {
     let errors =
         truth.slip_rad.iter().zip(&truth.force).map(|(&a, f)| (axle.normalized_force(a) - f).powi(2));
     (errors.sum::<f64>() / truth.force.len() as f64).sqrt()
 }
 
 /// The best that four parameters can do: fitted to the true forces, from several starts.
-pub fn floor(truth: &Truth) -> Result<(MagicFormula, f64)> {
+pub(crate) fn floor(truth: &Truth) -> Result<(MagicFormula, f64)> {
     let axle = |x: &[f64]| MagicFormula { b: x[0], c: x[1], d: x[2], e: x[3] };
     let config = NelderMeadConfig { max_evaluations: 2000, ..NelderMeadConfig::default() };
     // A part of the samples says where; all say how much.
@@ -113,6 +139,6 @@ pub fn floor(truth: &Truth) -> Result<(MagicFormula, f64)> {
 }
 
 /// RMSE front and rear.
-pub fn score(tires: &PacejkaParameters, truth: &PerAxle<Truth>) -> [f64; 2] {
+pub(crate) fn score(tires: &PacejkaParameters, truth: &PerAxle<Truth>) -> [f64; 2] {
     [rmse(&tires.front, &truth.front), rmse(&tires.rear, &truth.rear)]
 }

@@ -1,0 +1,100 @@
+//! Watches the set in use: does it still fit what the car does, and if not, what became of the grip?
+//!
+//! On each short window of telemetry the peak factors D of both axles are fitted anew, everything else held at the accepted set. A change that is
+//! both larger than its uncertainty and worth acting on is a notice; small corners tell nothing and give none.
+
+use gripsight_signals::{DataHealth, StateSequence};
+use gripsight_vehicle::VehicleParameters;
+
+use crate::data::Data;
+use crate::judge::rollout_errors;
+use crate::rollout::{TireRollout, vector_of};
+use crate::shooting::{Parameter, Problem, fit};
+use crate::tires::D_BOUNDS;
+use crate::{AcceptedSet, Estimate, IdentificationError, PerAxle, vehicle_hash};
+
+/// Smallest change of D that is worth a notice, as a share of it.
+const NOTICEABLE: f64 = 0.08;
+/// A change has to be this many standard errors large.
+const SIGNIFICANT: f64 = 3.0;
+/// Fewest windows of the telemetry to look at.
+const WINDOWS: usize = 4;
+/// Robustness of the window loss, in noises.
+const ROBUST_K: f64 = 3.0;
+
+/// What a look at the latest telemetry gave.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reading {
+    /// End of the telemetry looked at, in nanoseconds.
+    pub stamp_ns: i64,
+    /// Rollout error with the set in use over what it was when it was accepted: 1 is as good as then.
+    pub error_ratio: f64,
+    /// Peak factor that fits the telemetry looked at, everything else held.
+    pub peak_factor: PerAxle<Estimate>,
+    /// Whether the grip has changed: identify anew.
+    pub changed: bool,
+}
+
+/// Watches one accepted set.
+#[derive(Debug, Clone)]
+pub struct Monitor {
+    vehicle: VehicleParameters,
+    set: AcceptedSet,
+}
+
+impl Monitor {
+    /// Watches a set.
+    ///
+    /// # Errors
+    /// [`IdentificationError::OtherCar`] for a set of a car with other parameters.
+    pub fn new(vehicle: &VehicleParameters, set: &AcceptedSet) -> Result<Self, IdentificationError> {
+        let expected = vehicle_hash(vehicle);
+        if set.vehicle_hash != expected {
+            return Err(IdentificationError::OtherCar { expected, got: set.vehicle_hash.clone() });
+        }
+        Ok(Self { vehicle: vehicle.clone(), set: set.clone() })
+    }
+
+    /// Looks at some seconds of telemetry.
+    ///
+    /// # Errors
+    /// [`IdentificationError`] for telemetry that is malformed, frozen or holds less than 2.4 s of driving.
+    pub fn look(&self, sequence: &StateSequence) -> Result<Reading, IdentificationError> {
+        let data = Data::new(sequence, &self.vehicle, &DataHealth::of(sequence)?, WINDOWS)?;
+        let model = TireRollout::new(&self.vehicle, &data);
+        let windows: Vec<_> = data.windows.iter().map(|(w, _)| *w).collect();
+        let p = vector_of(&self.set.phi_p, &self.set.corrections, &self.set.nuisance);
+        let sigma = self.set.rollout_rmse.map(|s| s.max(1e-6));
+        let parameters: Vec<Parameter> = p
+            .iter()
+            .enumerate()
+            .map(|(j, &start)| {
+                let free = j == 2 || j == 6;
+                let (low, high) = if free { D_BOUNDS } else { (f64::NEG_INFINITY, f64::INFINITY) };
+                Parameter { start, low, high, free, prior: None }
+            })
+            .collect();
+        let problem = Problem {
+            model: &model,
+            windows: &windows,
+            sigma: &sigma,
+            parameters: &parameters,
+            robust_k: ROBUST_K,
+            max_iterations: 15,
+        };
+        let found = fit(&problem, None);
+        let axle = |j: usize| (found.parameters[j], found.standard_error(j), p[j]);
+        let differs = |(now, error, then): (f64, Option<f64>, f64)| {
+            let change = (now - then).abs();
+            error.is_some_and(|e| change > SIGNIFICANT * e) && change > NOTICEABLE * then
+        };
+        let end_ns = (sequence.duration_s() * gripsight_signals::NS_PER_S) as i64;
+        Ok(Reading {
+            stamp_ns: sequence.start_stamp_ns + end_ns,
+            error_ratio: rollout_errors(&model, &p, &windows, &sigma).normalized,
+            peak_factor: PerAxle { front: axle(2), rear: axle(6) }
+                .map(|(now, error, _)| Estimate::from_error(now, error)),
+            changed: differs(axle(2)) || differs(axle(6)),
+        })
+    }
+}

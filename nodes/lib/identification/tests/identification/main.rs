@@ -1,0 +1,5 @@
+//! Identification as a whole: on the reference car, which knows the truth, and on recorded cars, which do not.
+
+mod recorded;
+mod simulated;
+mod support;

@@ -1,0 +1,68 @@
+//! Recorded cars: what can be said of them, and what cannot.
+
+use gripsight_identification::{Config, FrictionPrior, Outcome, ResidualKind, identify};
+use gripsight_signals::StateSequence;
+use gripsight_vehicle::VehicleParameters;
+
+use crate::support::recorded;
+
+fn run(
+    sequence: &StateSequence,
+    vehicle: &VehicleParameters,
+    mu: Option<f64>,
+    residual: ResidualKind,
+) -> Outcome {
+    let config = Config { residual, ..Config::default() };
+    let prior = mu.map(|mu| FrictionPrior { mu, sigma: 0.1 });
+    identify(sequence, vehicle, prior, None, &config, &mut |_| {}).unwrap()
+}
+
+#[test]
+fn the_small_car_shows_its_plateau_and_gives_the_same_bytes_twice() {
+    let Some((sequence, vehicle)) = recorded("rc10_mocap", 60.0) else { return };
+    let outcome = run(&sequence, &vehicle, None, ResidualKind::S4);
+    assert!(outcome.phi_p.is_finite());
+    for name in &outcome.on_bound {
+        assert!(
+            outcome.reasons.iter().any(|r| r.contains(name)),
+            "{name} is on a bound and no reason says so"
+        );
+    }
+    // The plateau of the car is 0.45 to 0.5 g; the front tires limit it.
+    let front = outcome.phi_p.front.max_force_within(outcome.slip_range_rad.front.high);
+    assert!((0.4..0.6).contains(&front), "front plateau {front}");
+    // Motion capture sees a late command: 80 ms by its authors, servo and transport together.
+    assert!((0.03..0.1).contains(&outcome.signals.steering_delay_s), "{:?}", outcome.signals);
+    assert!(outcome.rmse.rollout.after < 0.6 * outcome.rmse.rollout.before);
+    let again = run(&sequence, &vehicle, None, ResidualKind::S4);
+    assert_eq!(serde_json::to_string(&outcome).unwrap(), serde_json::to_string(&again).unwrap());
+}
+
+#[test]
+fn the_indy_car_has_stiffness_but_no_peak() {
+    let Some((sequence, vehicle)) = recorded("iac_putnam", f64::INFINITY) else { return };
+    let alone = run(&sequence, &vehicle, None, ResidualKind::None);
+    assert!(!alone.accepted && !alone.peak_friction.front.reached && !alone.peak_friction.rear.reached);
+    assert!(alone.reasons.iter().any(|r| r.contains("peak not reached")), "{:?}", alone.reasons);
+    for stiffness in [alone.cornering_stiffness_n_per_rad.front, alone.cornering_stiffness_n_per_rad.rear] {
+        assert!(stiffness.low > 0.0 && stiffness.low < stiffness.value && stiffness.value < stiffness.high);
+    }
+    let with_prior = run(&sequence, &vehicle, Some(1.0), ResidualKind::None);
+    assert!(with_prior.accepted, "{:?}", with_prior.reasons);
+    for (peak, d) in [
+        (with_prior.peak_friction.front, with_prior.phi_p.front.d),
+        (with_prior.peak_friction.rear, with_prior.phi_p.rear.d),
+    ] {
+        assert!(peak.from_prior && !peak.reached);
+        assert_eq!(d, 1.0);
+    }
+}
+
+#[test]
+fn a_poor_v_y_is_named() {
+    let Some((sequence, vehicle)) = recorded("f1tenth_ds5", f64::INFINITY) else { return };
+    let outcome = run(&sequence, &vehicle, None, ResidualKind::None);
+    assert!(!outcome.accepted);
+    assert!(outcome.reasons.iter().any(|r| r.starts_with("v_y scatters by 0.1")), "{:?}", outcome.reasons);
+    assert!(outcome.drive_next.iter().any(|d| d.contains("v_y")));
+}

@@ -1,0 +1,202 @@
+//! The reference car: another model, and known truth.
+
+use gripsight_identification::{
+    Config, FrictionPrior, Identification, IdentificationError, Method, Monitor, Next, PerAxle, ResidualKind,
+    Started, identify, train_residual,
+};
+use gripsight_reference_car::{EffectSetting, Friction, Recording};
+use gripsight_signals::StateSequence;
+use gripsight_vehicle::{MagicFormula, PacejkaParameters, VehicleParameters};
+
+use crate::support::{drive, scenario, with_background};
+
+fn quick() -> Config {
+    Config { residual: ResidualKind::None, ..Config::default() }
+}
+
+/// Root mean square error of F_y/F_z of both axles against the plant's own forces.
+fn errors(tires: &PacejkaParameters, recording: &Recording, vehicle: &VehicleParameters) -> PerAxle<f64> {
+    let mut sum = PerAxle { front: 0.0, rear: 0.0 };
+    for t in &recording.truth {
+        let m = &t.motion;
+        let v_x = m.v_x_mps.max(0.5);
+        let front = m.steering_rad - ((m.v_y_mps + vehicle.l_f_m * m.yaw_rate_radps) / v_x).atan();
+        let rear = -((m.v_y_mps - vehicle.l_r_m * m.yaw_rate_radps) / v_x).atan();
+        let (f, r) = (t.front_axle_n(), t.rear_axle_n());
+        sum.front += (tires.front.normalized_force(front) - f[1] / f[2]).powi(2);
+        sum.rear += (tires.rear.normalized_force(rear) - r[1] / r[2]).powi(2);
+    }
+    sum.map(|s| (s / recording.truth.len() as f64).sqrt())
+}
+
+#[test]
+fn finds_the_forces_of_a_car_with_all_the_background_effects() {
+    let (recording, sequence, vehicle) = drive(with_background(scenario("f1tenth", "club", 0.9, 0.9, 3)));
+    let outcome = identify(&sequence, &vehicle, None, None, &quick(), &mut |_| {}).unwrap();
+    let error = errors(&outcome.phi_p, &recording, &vehicle);
+    // The paper's S4 has 0.051 and 0.033.
+    assert!(error.front < 0.051 && error.rear < 0.051, "{error:?} {:?}", outcome.reasons);
+}
+
+#[test]
+fn finds_delay_and_lever_arm_that_were_put_in() {
+    let car = scenario("f1tenth", "esses", 0.9, 0.85, 4)
+        .effect(EffectSetting::parse("steering_delay=0.06").unwrap())
+        .effect(EffectSetting::parse("v_y_lever_arm=-0.1").unwrap());
+    let plain = scenario("f1tenth", "esses", 0.9, 0.85, 4);
+    let found = |scenario| {
+        let (_, sequence, vehicle) = drive(scenario);
+        identify(&sequence, &vehicle, None, None, &quick(), &mut |_| {}).unwrap().signals
+    };
+    let (with, without) = (found(car), found(plain));
+    assert!((with.steering_delay_s - without.steering_delay_s - 0.06).abs() < 0.01, "{with:?} {without:?}");
+    assert!((with.v_y_lever_arm_m - without.v_y_lever_arm_m + 0.1).abs() < 0.03, "{with:?} {without:?}");
+}
+
+#[test]
+fn a_mirrored_drive_gives_the_same_tires() {
+    let (_, sequence, vehicle) = drive(scenario("f1tenth", "club", 0.9, 0.85, 5).duration(20.0));
+    let flip = |v: &Vec<f32>| v.iter().map(|x| -x).collect::<Vec<_>>();
+    let mirrored = StateSequence {
+        v_y_mps: flip(&sequence.v_y_mps),
+        yaw_rate_radps: flip(&sequence.yaw_rate_radps),
+        steering_rad: flip(&sequence.steering_rad),
+        y_m: flip(&sequence.y_m),
+        yaw_rad: flip(&sequence.yaw_rad),
+        a_y_mps2: flip(&sequence.a_y_mps2),
+        gyro_yaw_rate_radps: flip(&sequence.gyro_yaw_rate_radps),
+        ..sequence.clone()
+    };
+    let [a, b] = [&sequence, &mirrored]
+        .map(|s| identify(s, &vehicle, None, None, &quick(), &mut |_| {}).unwrap().phi_p.to_array());
+    for (a, b) in a.iter().zip(b) {
+        approx::assert_relative_eq!(*a, b, max_relative = 1e-3, epsilon = 1e-3);
+    }
+}
+
+#[test]
+fn the_end_does_not_depend_on_the_start() {
+    let (_, sequence, vehicle) = drive(scenario("f1tenth", "club", 0.9, 0.9, 6));
+    let shapes = [(6.0, 1.4, 0.0), (12.0, 1.1, -1.0), (3.0, 1.9, 0.5)];
+    let ends: Vec<_> = [0.3, 0.51, 0.8, 1.2]
+        .iter()
+        .zip(shapes.iter().cycle())
+        .map(|(&mu, &(k, c, e))| {
+            let axle = MagicFormula::from_stiffness(k, c, mu, e);
+            let config = Config { initial: PacejkaParameters { front: axle, rear: axle }, ..quick() };
+            identify(&sequence, &vehicle, None, None, &config, &mut |_| {}).unwrap()
+        })
+        .collect();
+    for end in &ends[1..] {
+        for (a, b) in [
+            (
+                end.cornering_stiffness_n_per_rad.front.value,
+                ends[0].cornering_stiffness_n_per_rad.front.value,
+            ),
+            (end.cornering_stiffness_n_per_rad.rear.value, ends[0].cornering_stiffness_n_per_rad.rear.value),
+        ] {
+            approx::assert_relative_eq!(a, b, max_relative = 0.02);
+        }
+    }
+}
+
+#[test]
+fn the_state_machine_is_the_whole_run_and_refuses_foreign_models() {
+    let (_, sequence, vehicle) = drive(scenario("f1tenth", "club", 0.9, 0.9, 7).duration(15.0));
+    let config = Config { epochs: 5, seed: 3, ..Config::default() };
+    let whole = identify(&sequence, &vehicle, None, None, &config, &mut |_| {}).unwrap();
+    let Started::Running(mut run) = Identification::start(&sequence, &vehicle, None, None, &config).unwrap()
+    else {
+        panic!("refused");
+    };
+    let outcome = loop {
+        let candidate = run.candidate().unwrap().clone();
+        let mut go_on = |_| std::ops::ControlFlow::Continue(());
+        let model = train_residual(&sequence, &vehicle, &candidate, &config, &mut go_on).unwrap();
+        let mut foreign = model.clone();
+        foreign.key.iteration += 1;
+        assert!(matches!(run.advance(&foreign), Err(IdentificationError::WrongModel { .. })));
+        match run.advance(&model).unwrap() {
+            Next::Candidate(next) => assert_eq!(next.key.iteration, candidate.key.iteration + 1),
+            Next::Done(outcome) => {
+                assert!(matches!(run.advance(&model), Err(IdentificationError::Ended)));
+                break *outcome;
+            }
+        }
+    };
+    assert_eq!(serde_json::to_string(&whole).unwrap(), serde_json::to_string(&outcome).unwrap());
+}
+
+#[test]
+fn the_papers_method_runs_with_every_residual() {
+    let (_, sequence, vehicle) = drive(scenario("f1tenth", "club", 0.9, 0.9, 8).duration(15.0));
+    let prior = Some(FrictionPrior { mu: 0.8, sigma: 0.1 });
+    for residual in [ResidualKind::S4, ResidualKind::Mlp, ResidualKind::Rnn, ResidualKind::None] {
+        let config =
+            Config { method: Method::Paper, residual, epochs: 5, max_iterations: 2, ..Config::default() };
+        let outcome = identify(&sequence, &vehicle, prior, None, &config, &mut |_| {}).unwrap();
+        assert!(outcome.phi_p.is_finite() && outcome.iterations >= 1, "{residual:?}");
+    }
+}
+
+#[test]
+fn telemetry_that_cannot_tell_is_refused_with_a_figure() {
+    let (_, sequence, vehicle) = drive(scenario("f1tenth", "club", 0.9, 0.9, 9).duration(15.0));
+    let cut = |n: usize| StateSequence {
+        time_s: sequence.time_s[..n].to_vec(),
+        v_x_mps: sequence.v_x_mps[..n].to_vec(),
+        v_y_mps: sequence.v_y_mps[..n].to_vec(),
+        yaw_rate_radps: sequence.yaw_rate_radps[..n].to_vec(),
+        steering_rad: sequence.steering_rad[..n].to_vec(),
+        ..StateSequence::default()
+    };
+    let n = sequence.len();
+    let small = |v: &Vec<f32>, by: f32| v.iter().map(|x| x * by).collect::<Vec<_>>();
+    let cases = [
+        ("too short", cut(200)),
+        ("standing", StateSequence { v_x_mps: small(&sequence.v_x_mps, 0.01), ..cut(n) }),
+        ("straight", StateSequence { steering_rad: small(&sequence.steering_rad, 1e-3), ..cut(n) }),
+        ("no v_y", StateSequence { v_y_mps: vec![0.0; n], ..cut(n) }),
+    ];
+    for (name, sequence) in cases {
+        let outcome = identify(&sequence, &vehicle, None, None, &quick(), &mut |_| {}).unwrap();
+        assert!(!outcome.accepted && outcome.reasons.len() == 1 && !outcome.drive_next.is_empty(), "{name}");
+        assert!(outcome.phi_p.is_finite(), "{name}");
+    }
+}
+
+#[test]
+fn broken_telemetry_is_an_error() {
+    let (_, sequence, vehicle) = drive(scenario("f1tenth", "club", 0.9, 0.9, 9).duration(12.0));
+    let mut nan = sequence.clone();
+    nan.v_y_mps[100] = f32::NAN;
+    let mut frozen = sequence.clone();
+    let stuck = frozen.v_y_mps[300];
+    frozen.v_y_mps[300..400].fill(stuck);
+    let mut backwards = sequence.clone();
+    backwards.time_s[50] = backwards.time_s[48];
+    let start = |s: &StateSequence| Identification::start(s, &vehicle, None, None, &quick()).unwrap_err();
+    assert!(matches!(start(&nan), IdentificationError::Signal(_)));
+    assert!(matches!(start(&frozen), IdentificationError::Frozen { channel: "v_y_mps", .. }));
+    assert!(matches!(start(&backwards), IdentificationError::Signal(_)));
+}
+
+#[test]
+fn the_monitor_notices_a_loss_of_grip_and_nothing_else() {
+    let (_, sequence, vehicle) = drive(scenario("f1tenth", "club", 0.9, 0.9, 11));
+    let outcome = identify(&sequence, &vehicle, None, None, &quick(), &mut |_| {}).unwrap();
+    let set = outcome.accepted_set().unwrap_or_else(|| panic!("{:?}", outcome.reasons));
+    let monitor = Monitor::new(&vehicle, &set).unwrap();
+    let (_, same, _) = drive(scenario("f1tenth", "club", 0.9, 0.9, 13).duration(10.0));
+    let quiet = monitor.look(&same).unwrap();
+    assert!(!quiet.changed, "{quiet:?}");
+    let wet = Friction::Uniform { mu: 0.65 };
+    let (_, slippery, _) = drive(scenario("f1tenth", "club", 0.9, 0.62, 13).friction(wet).duration(10.0));
+    let notice = monitor.look(&slippery).unwrap();
+    assert!(notice.changed, "{notice:?}");
+    assert!(notice.peak_factor.front.value < 0.9 * set.phi_p.front.d, "{notice:?}");
+    // Warm-started, the next run follows.
+    let (_, longer, _) = drive(scenario("f1tenth", "club", 0.65, 0.9, 15));
+    let next = identify(&longer, &vehicle, None, Some(&set), &quick(), &mut |_| {}).unwrap();
+    assert!(next.phi_p.front.d < 0.85 * set.phi_p.front.d, "{:?}", next.phi_p);
+}
