@@ -1,5 +1,7 @@
 //! The structs and the `.msg` files say the same: names, types and order of all fields.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+
 use std::collections::BTreeSet;
 
 use gripsight_msgs::idl::{self, Base, Multiplicity};

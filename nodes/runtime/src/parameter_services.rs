@@ -2,6 +2,7 @@
 //!
 //! ros2-client's own services know one mapping of services to DDS only, and no descriptors.
 
+use std::collections::BTreeSet;
 use std::future::Future;
 use std::sync::Arc;
 
@@ -86,7 +87,9 @@ impl ParameterServices {
                 answer(set_atomically, |request: SetRequest| SetAtomicallyResponse {
                     result: self.set(request.parameters)
                 }),
-                answer(list, |request: ListRequest| ListResponse { result: self.list(&request) }),
+                answer(list, |request: ListRequest| ListResponse {
+                    result: select(self.store.names(), &request)
+                }),
                 answer(describe, |request: NamesRequest| DescribeResponse {
                     descriptors: self.each(&request.names, ParameterStore::descriptor),
                 }),
@@ -126,32 +129,23 @@ impl ParameterServices {
             }
         }
     }
+}
 
-    /// Names at most `depth` levels below the prefixes; 0: any level; no prefix: all names.
-    fn list(&self, request: &ListRequest) -> rcl::ListParametersResult {
-        let levels = |text: &str| text.split('.').count() as u64;
-        let below = |name: &str, prefix: &str| {
-            name == prefix
-                || name
-                    .strip_prefix(prefix)
-                    .and_then(|rest| rest.strip_prefix('.'))
-                    .is_some_and(|rest| request.depth == 0 || levels(rest) <= request.depth)
-        };
-        let mut names = self.store.names();
-        names.retain(|name| {
-            if request.prefixes.is_empty() {
-                request.depth == 0 || levels(name) <= request.depth
-            } else {
-                request.prefixes.iter().any(|prefix| below(name, prefix))
-            }
-        });
-        let mut prefixes: Vec<String> = names
-            .iter()
-            .filter_map(|name| name.rsplit_once('.').map(|(prefix, _)| prefix.to_owned()))
-            .collect();
-        prefixes.dedup();
-        rcl::ListParametersResult { names, prefixes }
-    }
+/// Of `names` those at most `depth` levels below one of the prefixes; 0: any level; no prefix: all.
+fn select(mut names: Vec<String>, request: &ListRequest) -> rcl::ListParametersResult {
+    let is_shallow = |rest: &str| request.depth == 0 || rest.split('.').count() as u64 <= request.depth;
+    let is_below = |name: &str, prefix: &str| {
+        let rest = name.strip_prefix(prefix).and_then(|rest| rest.strip_prefix('.'));
+        name == prefix || rest.is_some_and(is_shallow)
+    };
+    names.retain(|name| match request.prefixes.as_slice() {
+        [] => is_shallow(name),
+        prefixes => prefixes.iter().any(|prefix| is_below(name, prefix)),
+    });
+    let prefixes: BTreeSet<&str> =
+        names.iter().filter_map(|name| name.rsplit_once('.')).map(|(prefix, _)| prefix).collect();
+    let prefixes = prefixes.into_iter().map(str::to_owned).collect();
+    rcl::ListParametersResult { names, prefixes }
 }
 
 struct Factory<'a> {
@@ -192,5 +186,26 @@ where
             }
             Err(error) => tracing::warn!("cannot read a parameter request: {error}"),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn listed(prefixes: &[&str], depth: u64) -> rcl::ListParametersResult {
+        let names = ["rate", "vehicle.axle.front", "vehicle.mass", "vehicles"].map(str::to_owned).to_vec();
+        let prefixes = prefixes.iter().map(|prefix| (*prefix).to_owned()).collect();
+        select(names, &ListRequest { prefixes, depth })
+    }
+
+    #[test]
+    fn names_are_listed_by_prefix_and_depth() {
+        assert_eq!(listed(&[], 0).names.len(), 4);
+        assert_eq!(listed(&[], 0).prefixes, ["vehicle", "vehicle.axle"]);
+        assert_eq!(listed(&[], 1).names, ["rate", "vehicles"]);
+        assert_eq!(listed(&["vehicle"], 0).names, ["vehicle.axle.front", "vehicle.mass"]);
+        assert_eq!(listed(&["vehicle"], 1).names, ["vehicle.mass"]);
+        assert_eq!(listed(&["rate", "none"], 1).names, ["rate"]);
     }
 }
