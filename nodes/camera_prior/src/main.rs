@@ -1,3 +1,9 @@
-//! Node: road pictures to a friction prior.
+//! Node: road pictures to a friction prior. See the README beside this folder.
 
-fn main() {}
+mod diagnostics;
+mod node;
+mod settings;
+
+fn main() -> anyhow::Result<()> {
+    gripsight_runtime::run("camera_prior", node::setup)
+}

@@ -225,7 +225,7 @@ impl FrictionEstimator {
         &self.basis
     }
 
-    /// Forgets all pictures: after a clock that jumped back.
+    /// Forgets all pictures. A stamp that jumps back by more than a second does the same.
     pub fn reset(&mut self) {
         self.transport = TransportGate::default();
         self.filter = DistanceFilter::default();
@@ -250,6 +250,9 @@ impl FrictionEstimator {
     pub fn update(&mut self, frame: &Frame<'_>, now_ns: i64, motion: &Motion) -> Estimate {
         if self.network.is_none() {
             return self.configured();
+        }
+        if self.transport.clock_went_back(frame.stamp_ns) {
+            self.reset();
         }
         let stamp = Some(frame.stamp_ns);
         let limits = &self.settings.transport;

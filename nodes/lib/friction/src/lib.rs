@@ -24,6 +24,7 @@ mod estimator;
 mod files;
 mod filter;
 mod network;
+mod odometer;
 mod picture;
 mod quality;
 mod tensor;
@@ -38,6 +39,7 @@ pub use estimator::{Estimate, FrictionEstimator, ModelLimits, Motion, Reason, Se
 pub use files::{find_library, find_model};
 pub use filter::{DistanceFilter, FilterSettings};
 pub use network::{Network, OnnxRuntime};
+pub use odometer::Odometer;
 pub use picture::{Encoding, Frame, FrameData, RawPicture, Region, RgbPicture};
 pub use quality::{QualityLimits, QualityStatistics};
 pub use tensor::{INPUT_SIDE, Preprocessor, normalise};

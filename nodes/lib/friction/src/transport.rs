@@ -5,6 +5,10 @@ use serde::Deserialize;
 use crate::estimator::Reason;
 use crate::picture::{FrameData, RawPicture};
 
+/// A stamp that goes back further than this means that the clock was set back (a bag started again); less is one late
+/// message. Nanoseconds.
+const CLOCK_JUMP_NS: i64 = 1_000_000_000;
+
 /// Limits of the transport gate.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -32,6 +36,12 @@ pub struct TransportGate {
 }
 
 impl TransportGate {
+    /// Whether a picture with this stamp comes after the clock was set back.
+    #[must_use]
+    pub fn clock_went_back(&self, stamp_ns: i64) -> bool {
+        self.newest_ns.is_some_and(|newest| newest.saturating_sub(stamp_ns) > CLOCK_JUMP_NS)
+    }
+
     /// Judges a picture by its stamp and its bytes. `distance_m`: distance travelled so far, where known.
     pub fn check(
         &mut self,
@@ -92,7 +102,8 @@ mod tests {
         let a = FrameData::Compressed(b"a");
         let b = FrameData::Compressed(b"b");
         assert_eq!(gate.check(&limits, 10 * S, 10 * S, &a, None), None);
-        assert_eq!(gate.check(&limits, 9 * S, 10 * S, &b, None), Some(Reason::OutOfOrder));
+        assert_eq!(gate.check(&limits, 95 * S / 10, 10 * S, &b, None), Some(Reason::OutOfOrder));
+        assert!(!gate.clock_went_back(95 * S / 10) && gate.clock_went_back(8 * S));
         assert_eq!(gate.check(&limits, 11 * S, 12 * S, &b, None), Some(Reason::Stale));
         assert_eq!(gate.check(&limits, 20 * S, 12 * S, &b, None), Some(Reason::Stale));
     }

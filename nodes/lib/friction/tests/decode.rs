@@ -1,5 +1,7 @@
 //! Every encoding gives the same picture; no bytes make the decoder panic.
 
+#![allow(clippy::unwrap_used)]
+
 use gripsight_friction::{FrameData, FrictionError, RawPicture, Region, RgbPicture, decode};
 use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageEncoder};

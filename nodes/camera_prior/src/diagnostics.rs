@@ -1,0 +1,105 @@
+//! The node's state in words.
+
+use gripsight_friction::{Estimate, Reason, Source};
+use gripsight_runtime::{Level, Status};
+
+/// Counts since the start.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Counts {
+    /// Pictures read, usable or not.
+    pub(crate) read: u64,
+    /// Pictures refused.
+    pub(crate) refused: u64,
+    /// Pictures left out because a newer one was waiting, or had been read.
+    pub(crate) dropped: u64,
+}
+
+/// What the state is judged by.
+pub(crate) struct Facts<'a> {
+    /// Why there is no network.
+    pub(crate) no_network: Option<&'a str>,
+    pub(crate) counts: Counts,
+    /// Pictures read since the last look.
+    pub(crate) newly_read: u64,
+    /// The last estimate.
+    pub(crate) last: Option<&'a Estimate>,
+    /// Whether odometry has arrived.
+    pub(crate) odometry: bool,
+    /// Longest time that reading a picture took since the last look, ms.
+    pub(crate) longest_ms: f64,
+}
+
+/// ERROR: no network, or no pictures. WARN: the last picture is not usable, or there is no odometry.
+pub(crate) fn status(facts: &Facts<'_>) -> Status {
+    let refused = facts.last.and_then(|e| e.reason.map(|reason| (reason, e.detail.as_deref())));
+    let (level, text) = if let Some(why) = facts.no_network {
+        (Level::Error, format!("the configured friction stands, there is no network: {why}"))
+    } else if facts.newly_read == 0 {
+        (Level::Error, "no picture arrives".to_owned())
+    } else if let Some((reason, detail)) = refused {
+        let level = if reason == Reason::NetworkFailed { Level::Error } else { Level::Warn };
+        (level, format!("the last picture is not usable: {}", detail.unwrap_or(reason.as_str())))
+    } else if !facts.odometry {
+        (Level::Warn, "no odometry: pictures are averaged by number, not by distance, and a frozen camera goes unnoticed".into())
+    } else {
+        (Level::Ok, "reading the road".to_owned())
+    };
+    let Counts { read, refused, dropped } = facts.counts;
+    let status = Status::new(level, text)
+        .value("pictures read", read)
+        .value("pictures refused", refused)
+        .value("pictures dropped for newer ones", dropped)
+        .value("longest time for a picture [ms]", format!("{:.1}", facts.longest_ms));
+    match facts.last {
+        Some(e) => status
+            .value("source", if e.source == Source::Camera { "camera" } else { "configured" })
+            .value("mu", format!("{:.3}", e.mu))
+            .value("sigma", format!("{:.3}", e.sigma))
+            .value("entropy", format!("{:.2}", e.entropy)),
+        None => status,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn estimate(reason: Option<Reason>) -> Estimate {
+        Estimate {
+            stamp_ns: Some(0),
+            source: Source::Camera,
+            reason,
+            detail: None,
+            mu: 0.5,
+            sigma: 0.1,
+            probability: vec![0.2; 5],
+            entropy: 0.3,
+            energy: -2.0,
+            quality: None,
+            distance_m: 3.0,
+            pictures: 4,
+        }
+    }
+
+    #[test]
+    fn each_condition_has_its_level() {
+        let (good, dark, failed) =
+            (estimate(None), estimate(Some(Reason::Dark)), estimate(Some(Reason::NetworkFailed)));
+        let facts = |last| Facts {
+            no_network: None,
+            counts: Counts::default(),
+            newly_read: 30,
+            last: Some(last),
+            odometry: true,
+            longest_ms: 2.0,
+        };
+        assert_eq!(status(&facts(&good)).level, Level::Ok);
+        assert_eq!(status(&Facts { newly_read: 0, ..facts(&good) }).level, Level::Error);
+        assert_eq!(status(&Facts { odometry: false, ..facts(&good) }).level, Level::Warn);
+        assert_eq!(status(&facts(&failed)).level, Level::Error);
+        let warned = status(&facts(&dark));
+        assert_eq!((warned.level, warned.message.contains("dark")), (Level::Warn, true));
+        let missing = status(&Facts { no_network: Some("no library"), ..facts(&good) });
+        assert_eq!((missing.level, missing.message.contains("no library")), (Level::Error, true));
+    }
+}

@@ -1,0 +1,217 @@
+//! Topics in, topics out.
+
+use std::time::{Duration, Instant};
+
+use futures::FutureExt;
+use gripsight_bag::{decode, encode};
+use gripsight_friction::{
+    Estimate, Frame, FrameData, FrictionEstimator, Motion, Odometer, RawPicture, Reason, RgbPicture, Source,
+};
+use gripsight_msgs::FrictionPrior;
+use gripsight_msgs::standard::nav_msgs::Odometry;
+use gripsight_msgs::standard::sensor_msgs::{CompressedImage, Image};
+use gripsight_msgs::standard::std_msgs::Header;
+use gripsight_runtime::{Clock, Descriptor, Diagnostics, Node, Publisher, Qos, Subscription};
+
+use crate::diagnostics::{Counts, Facts, status};
+use crate::settings;
+
+/// Declares parameters and topics; gives the node's work.
+pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyhow::Result<()>> + use<>> {
+    let configuration = settings::declare(node)?;
+    let no_network = configuration.network.as_ref().err().map(ToString::to_string);
+    if let Some(why) = &no_network {
+        tracing::error!("the configured friction stands, there is no network: {why}");
+    }
+    let estimator =
+        FrictionEstimator::new(configuration.settings, configuration.basis, configuration.network.ok());
+    let input = node.parameter(
+        "input",
+        String::from("both"),
+        Descriptor::new("Which picture topics to subscribe to")
+            .choices(&["both", "raw", "compressed"])
+            .read_only(),
+    )?;
+    let wanted = input.get();
+    let pictures = node.sensor_qos(2).with_depth(2);
+    let raw = (wanted != "compressed").then(|| node.subscription::<Image>("image", pictures)).transpose()?;
+    let compressed = (wanted != "raw")
+        .then(|| node.subscription::<CompressedImage>("image/compressed", pictures))
+        .transpose()?;
+    let odometry = node.subscription::<Odometry>("odom", node.sensor_qos(50))?;
+    let region = configuration.publish_region;
+    let state = State {
+        estimator,
+        no_network,
+        odometer: Odometer::default(),
+        counts: Counts::default(),
+        seen: Counts::default(),
+        last: None,
+        frame_id: String::new(),
+        longest_ms: 0.0,
+        clock: node.clock(),
+        diagnostics: node.diagnostics(),
+        friction: node.publisher("~/friction", Qos::latched())?,
+        region: region.then(|| node.publisher("~/region/compressed", Qos::reliable(1))).transpose()?,
+    };
+    Ok(work(state, raw, compressed, odometry))
+}
+
+async fn work(
+    mut state: State,
+    mut raw: Option<Subscription<Image>>,
+    mut compressed: Option<Subscription<CompressedImage>>,
+    mut odometry: Subscription<Odometry>,
+) -> anyhow::Result<()> {
+    let mut ticks = tokio::time::interval(Duration::from_secs(1));
+    loop {
+        // Odometry first: a picture is then placed by the newest distance.
+        tokio::select! {
+            biased;
+            Some(message) = odometry.next() => {
+                let sample = decode::odometry(&message);
+                state.odometer.push(sample.stamp_ns, sample.v_x_mps.hypot(sample.v_y_mps));
+            }
+            Some(first) = next(&mut compressed) => {
+                let message = newest(&mut compressed, first, &mut state.counts);
+                state.take(message.header, FrameData::Compressed(&message.data)).await;
+            }
+            Some(first) = next(&mut raw) => {
+                let message = newest(&mut raw, first, &mut state.counts);
+                let picture = RawPicture {
+                    width: message.width,
+                    height: message.height,
+                    step: message.step,
+                    encoding: &message.encoding,
+                    big_endian: message.is_bigendian != 0,
+                    data: &message.data,
+                };
+                state.take(message.header, FrameData::Raw(picture)).await;
+            }
+            _ = ticks.tick() => state.tick().await,
+            else => return Ok(()),
+        }
+    }
+}
+
+/// The next message; never, where there is no subscription.
+async fn next<M>(subscription: &mut Option<Subscription<M>>) -> Option<M> {
+    match subscription {
+        Some(subscription) => subscription.next().await,
+        None => std::future::pending().await,
+    }
+}
+
+/// The newest message that has arrived: those before it are old, and would only delay it.
+fn newest<M>(subscription: &mut Option<Subscription<M>>, first: M, counts: &mut Counts) -> M {
+    let mut message = first;
+    while let Some(Some(newer)) = next(subscription).now_or_never() {
+        message = newer;
+        counts.dropped += 1;
+    }
+    message
+}
+
+struct State {
+    estimator: FrictionEstimator,
+    no_network: Option<String>,
+    odometer: Odometer,
+    counts: Counts,
+    /// The counts when the state was last reported.
+    seen: Counts,
+    last: Option<Estimate>,
+    frame_id: String,
+    longest_ms: f64,
+    clock: Clock,
+    diagnostics: Diagnostics,
+    friction: Publisher<FrictionPrior>,
+    region: Option<Publisher<CompressedImage>>,
+}
+
+impl State {
+    /// Reads a picture and publishes what it says.
+    async fn take(&mut self, header: Header, data: FrameData<'_>) {
+        let stamp_ns = decode::stamp_ns(header.stamp);
+        let now_ns = decode::stamp_ns(self.clock.now());
+        let motion = Motion { distance_m: self.odometer.at(stamp_ns) };
+        let started = Instant::now();
+        let frame = Frame { stamp_ns, data };
+        let estimate = tokio::task::block_in_place(|| self.estimator.update(&frame, now_ns, &motion));
+        self.longest_ms = self.longest_ms.max(started.elapsed().as_secs_f64() * 1e3);
+        if estimate.reason == Some(Reason::OutOfOrder) {
+            self.counts.dropped += 1;
+            return;
+        }
+        self.counts.read += 1;
+        self.counts.refused += u64::from(!estimate.valid());
+        self.frame_id = header.frame_id;
+        self.friction.publish(&self.message(&estimate)).await;
+        self.last = Some(estimate);
+    }
+
+    /// Once a second: says how the node is, and publishes where no picture did.
+    async fn tick(&mut self) {
+        let newly_read = self.counts.read - self.seen.read;
+        if newly_read == 0 || self.no_network.is_some() {
+            let estimate = self.estimator.without_picture();
+            self.friction.publish(&self.message(&estimate)).await;
+            self.last = Some(estimate);
+        }
+        let facts = Facts {
+            no_network: self.no_network.as_deref(),
+            counts: self.counts,
+            newly_read,
+            last: self.last.as_ref(),
+            odometry: self.odometer.is_running(),
+            longest_ms: self.longest_ms,
+        };
+        self.diagnostics.report("camera", status(&facts));
+        self.seen = self.counts;
+        self.longest_ms = 0.0;
+        if let (Some(publisher), Some(picture)) = (&self.region, self.estimator.last_input())
+            && let Some(message) = region_message(picture, self.header(self.last.as_ref()))
+        {
+            publisher.publish(&message).await;
+        }
+    }
+
+    fn header(&self, estimate: Option<&Estimate>) -> Header {
+        let stamp = estimate.and_then(|e| e.stamp_ns).map_or_else(|| self.clock.now(), encode::time);
+        Header { stamp, frame_id: self.frame_id.clone() }
+    }
+
+    fn message(&self, estimate: &Estimate) -> FrictionPrior {
+        let classes = &self.estimator.basis().classes;
+        FrictionPrior {
+            header: self.header(Some(estimate)),
+            source: match estimate.source {
+                Source::Configured => FrictionPrior::CONFIGURED,
+                Source::Camera => FrictionPrior::CAMERA,
+            },
+            valid: estimate.valid(),
+            reason: estimate.reason.map_or("", Reason::as_str).to_owned(),
+            mu: estimate.mu,
+            sigma: estimate.sigma,
+            classes: classes.iter().map(|c| c.name.clone()).collect(),
+            probability: estimate.probability.clone(),
+            class_mu: classes.iter().map(|c| c.mu).collect(),
+            entropy: estimate.entropy,
+            distance_m: estimate.distance_m,
+            pictures: estimate.pictures,
+        }
+    }
+}
+
+/// The network's input as a JPEG; none where it cannot be encoded.
+fn region_message(picture: &RgbPicture, header: Header) -> Option<CompressedImage> {
+    let mut data = Vec::new();
+    let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut data, 90);
+    let colour = image::ExtendedColorType::Rgb8;
+    match encoder.encode(&picture.data, picture.width, picture.height, colour) {
+        Ok(()) => Some(CompressedImage { header, format: "jpeg".to_owned(), data }),
+        Err(error) => {
+            tracing::warn!("region of interest not encoded: {error}");
+            None
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! The node's parameters.
+
+use std::path::{Path, PathBuf};
+
+use gripsight_friction::{
+    Basis, FilterSettings, FrictionError, ModelLimits, Network, OnnxRuntime, Prior, QualityLimits, Region,
+    Settings, TransportLimits, find_library, find_model,
+};
+use gripsight_runtime::{Descriptor, Node};
+
+/// What the parameters say, files read.
+pub(crate) struct Configuration {
+    pub(crate) settings: Settings,
+    pub(crate) basis: Basis,
+    /// The network, or why there is none.
+    pub(crate) network: Result<Box<dyn Network>, FrictionError>,
+    pub(crate) publish_region: bool,
+}
+
+/// Declares the parameters and loads what they name.
+pub(crate) fn declare(node: &mut Node) -> anyhow::Result<Configuration> {
+    let default = Settings::default();
+    let library = path(
+        node,
+        "onnxruntime_library",
+        "ONNX Runtime library; empty: searched beside the program and above it",
+    )?;
+    let model =
+        path(node, "model", "Network, an ONNX file; empty: searched beside the program and above it")?;
+    let basis = match path(node, "basis", "Friction basis, a YAML file; empty: the released one")? {
+        Some(file) => {
+            let text = std::fs::read_to_string(&file)
+                .map_err(|source| FrictionError::Read { path: file, source })?;
+            Basis::from_yaml(&text)?
+        }
+        None => Basis::builtin()?,
+    };
+    let edges = Descriptor::new("Part of the picture that shows road: left, top, right, bottom as shares")
+        .range(0.0..=1.0);
+    let edges = node.parameter("region", vec![0.0, 0.0, 1.0, 1.0], edges.read_only())?.get();
+    let [left, top, right, bottom] = edges[..] else {
+        anyhow::bail!("parameter region: expected 4 numbers, got {}", edges.len());
+    };
+    let mut number = |name: &str, value: f64, text: &str, low: f64, high: f64| {
+        let descriptor = Descriptor::new(text).range(low..=high).read_only();
+        node.parameter(name, value, descriptor).map(|parameter| parameter.get())
+    };
+    let (transport, quality, doubt, filter) =
+        (default.transport, default.quality, default.model, default.filter);
+    let settings = Settings {
+        region: Region::new(left, top, right, bottom)?,
+        transport: TransportLimits {
+            most_age_s: number(
+                "most_age_s",
+                transport.most_age_s,
+                "Age above which a picture is stale [s]",
+                0.01,
+                1e9,
+            )?,
+            most_ahead_s: number(
+                "most_ahead_s",
+                transport.most_ahead_s,
+                "How far a stamp may be ahead of the clock [s]",
+                0.0,
+                1e9,
+            )?,
+            frozen_after_m: number(
+                "frozen_after_m",
+                transport.frozen_after_m,
+                "Distance driven without a new picture that means a frozen camera [m]",
+                0.01,
+                1e3,
+            )?,
+        },
+        quality: QualityLimits {
+            least_mean: number(
+                "least_mean",
+                quality.least_mean,
+                "Mean luma below which a picture is dark, of 255",
+                0.0,
+                255.0,
+            )?,
+            most_dark: number(
+                "most_dark",
+                quality.most_dark,
+                "Share of black pixels above which a picture is dark",
+                0.0,
+                1.0,
+            )?,
+            most_saturated: number(
+                "most_saturated",
+                quality.most_saturated,
+                "Share of white pixels above which a picture is over-exposed",
+                0.0,
+                1.0,
+            )?,
+            most_noise: number(
+                "most_noise",
+                quality.most_noise,
+                "Noise above which nothing can be read, levels of luma",
+                0.0,
+                255.0,
+            )?,
+            least_structure: number(
+                "least_structure",
+                quality.least_structure,
+                "Structure below which a picture is blurred, levels of luma",
+                0.0,
+                255.0,
+            )?,
+        },
+        model: ModelLimits {
+            most_entropy: number(
+                "most_entropy",
+                doubt.most_entropy,
+                "Largest entropy of p that is believed, of 1",
+                0.0,
+                1.0,
+            )?,
+            most_energy: number(
+                "most_energy",
+                doubt.most_energy,
+                "Largest energy of the logits that is believed",
+                -1e3,
+                1e3,
+            )?,
+        },
+        filter: FilterSettings {
+            length_m: number(
+                "filter_length_m",
+                filter.length_m,
+                "Distance over which a picture's weight falls to 1/e [m]",
+                0.01,
+                1e4,
+            )?,
+            ..filter
+        },
+        configured: Prior {
+            mu: number(
+                "configured_mu",
+                default.configured.mu,
+                "Friction to publish while there is no network",
+                0.01,
+                3.0,
+            )?,
+            sigma: number(
+                "configured_sigma",
+                default.configured.sigma,
+                "Its standard deviation",
+                0.001,
+                3.0,
+            )?,
+        },
+    };
+    let publish_region =
+        Descriptor::new("Publish what the network sees on ~/region/compressed, once a second").read_only();
+    let publish_region = node.parameter("publish_region", false, publish_region)?.get();
+    let program = std::env::current_exe()?;
+    let network = network(library.as_deref(), model.as_deref(), program.parent().unwrap_or(Path::new(".")));
+    Ok(Configuration { settings, basis, network, publish_region })
+}
+
+fn network(
+    library: Option<&Path>,
+    model: Option<&Path>,
+    beside: &Path,
+) -> Result<Box<dyn Network>, FrictionError> {
+    Ok(Box::new(OnnxRuntime::load(&find_library(library, beside)?, &find_model(model, beside)?)?))
+}
+
+/// A parameter that names a file; an empty text names none.
+fn path(node: &mut Node, name: &str, text: &str) -> anyhow::Result<Option<PathBuf>> {
+    let value = node.parameter(name, String::new(), Descriptor::new(text).read_only())?.get();
+    Ok((!value.is_empty()).then(|| value.into()))
+}
