@@ -11,14 +11,13 @@ use gripsight_reference_car::{
     CAR_NAMES, CarParameters, Course, DriverKind, EFFECTS, EffectSetting, Friction, MANOEUVRE_NAMES,
     Recording, Scenario, SensorSample, Simulation, TRACK_NAMES, write_truth_csv,
 };
-use gripsight_signals::{DriveSample, ImuSample, OdometrySample, WheelsSample};
+use gripsight_signals::Measurement;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::Outcome;
 
-/// The first stamp of every simulated bag, in seconds since 1970.
-const START_S: u32 = 1_700_000_000;
-const NS_PER_S: f64 = 1e9;
+/// The first stamp of every simulated bag, since 1970.
+const START_NS: i64 = 1_700_000_000_000_000_000;
 
 /// Drive the reference car and record a bag.
 ///
@@ -102,7 +101,7 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Outcome> {
     let messages = write_bag(&args.out, &recording)?;
     let file =
         File::create(&truth_path).with_context(|| format!("cannot create {}", truth_path.display()))?;
-    write_truth_csv(BufWriter::new(file), &recording.truth, f64::from(START_S))?;
+    write_truth_csv(BufWriter::new(file), &recording.truth, START_NS as f64 * 1e-9)?;
     std::fs::write(&vehicle_path, vehicle_file(&car))
         .with_context(|| format!("cannot write {}", vehicle_path.display()))?;
     println!("{}: {messages} messages", args.out.display());
@@ -157,42 +156,13 @@ fn beside(bag: &Path, ending: &str) -> PathBuf {
 fn write_bag(path: &Path, recording: &Recording) -> anyhow::Result<usize> {
     let mut bag = BagWriter::create(path)?;
     for sample in &recording.samples {
-        let stamp_ns = i64::from(START_S) * NS_PER_S as i64 + (sample.stamp_s() * NS_PER_S).round() as i64;
-        match sample {
-            SensorSample::Odometry(s) => {
-                let sample = OdometrySample {
-                    stamp_ns,
-                    x_m: s.x_m,
-                    y_m: s.y_m,
-                    yaw_rad: s.heading_rad,
-                    v_x_mps: s.v_x_mps,
-                    v_y_mps: s.v_y_mps,
-                    yaw_rate_radps: s.yaw_rate_radps,
-                };
-                bag.write("/car_state/odom", stamp_ns, &encode::odometry(&sample))?;
-            }
-            SensorSample::Drive(s) => {
-                let sample = DriveSample {
-                    stamp_ns,
-                    steering_angle_rad: s.steering_rad,
-                    speed_mps: s.speed_mps,
-                    acceleration_mps2: s.acceleration_mps2,
-                };
-                bag.write("/drive", stamp_ns, &encode::drive(&sample))?;
-            }
-            SensorSample::Imu(s) => {
-                let sample = ImuSample {
-                    stamp_ns,
-                    a_x_mps2: s.a_x_mps2,
-                    a_y_mps2: s.a_y_mps2,
-                    yaw_rate_radps: s.yaw_rate_radps,
-                };
-                bag.write("/imu/data", stamp_ns, &encode::imu(&sample))?;
-            }
-            SensorSample::Wheels(s) => {
-                let sample = WheelsSample { stamp_ns, speed: s.wheel_radps, effort_nm: None };
-                bag.write("/wheel_speeds", stamp_ns, &encode::wheels(&sample))?;
-            }
+        let measurement = sample.measurement(START_NS);
+        let stamp_ns = measurement.stamp_ns();
+        match measurement {
+            Measurement::Odometry(m) => bag.write("/car_state/odom", stamp_ns, &encode::odometry(&m))?,
+            Measurement::Drive(m) => bag.write("/drive", stamp_ns, &encode::drive(&m))?,
+            Measurement::Imu(m) => bag.write("/imu/data", stamp_ns, &encode::imu(&m))?,
+            Measurement::Wheels(m) => bag.write("/wheel_speeds", stamp_ns, &encode::wheels(&m))?,
         }
     }
     bag.finish()?;

@@ -1,3 +1,9 @@
-//! Node: the reference car, live on topics.
+//! Node: the reference car, live on topics. See the README beside this folder.
 
-fn main() {}
+mod diagnostics;
+mod node;
+mod settings;
+
+fn main() -> anyhow::Result<()> {
+    gripsight_runtime::run("sim_car", node::setup)
+}

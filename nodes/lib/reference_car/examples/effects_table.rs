@@ -150,7 +150,7 @@ fn compare(car: &CarParameters, effect: &EffectSpec) -> Result<Vec<Pair>, Box<dy
             .now()
             .map_or(0.0, |t| t.motion.specific_y_mps2 - t.motion.v_x_mps * t.motion.yaw_rate_radps);
         let time_s = without.time_s();
-        if let (Some(with), Some(without)) = (signals(&with.drain()), signals(&without.drain())) {
+        if let (Some(with), Some(without)) = (signals(&with.drain().0), signals(&without.drain().0)) {
             pairs.push(Pair { time_s, with, without, v_y_dot });
         }
         if step % (WINDOW_S / 0.001) as u64 == 0 {

@@ -236,7 +236,7 @@ impl Plant {
 
     fn position(&self, wheel: usize) -> (f64, f64) {
         let half = self.car.track_width_m / 2.0;
-        (if wheel < 2 { self.l_f_m } else { -self.l_r_m }, if wheel % 2 == 0 { half } else { -half })
+        (if wheel < 2 { self.l_f_m } else { -self.l_r_m }, if wheel.is_multiple_of(2) { half } else { -half })
     }
 
     fn balance(&self, wheel: usize) -> f64 {

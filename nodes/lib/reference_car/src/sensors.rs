@@ -5,6 +5,7 @@
 
 use std::collections::VecDeque;
 
+use gripsight_signals::Measurement;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -14,6 +15,7 @@ use crate::car::{CarParameters, GRAVITY_MPS2};
 use crate::effects::SensorMechanisms;
 use crate::error::ReferenceCarError;
 use crate::motion::Motion;
+use crate::track::wrap_angle;
 
 /// Noise of one channel, in the channel's unit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
@@ -144,6 +146,41 @@ impl SensorSample {
             Self::Drive(s) => s.stamp_s,
             Self::Imu(s) => s.stamp_s,
             Self::Wheels(s) => s.stamp_s,
+        }
+    }
+}
+
+impl SensorSample {
+    /// The report as telemetry, its stamp counted from `start_ns`.
+    pub fn measurement(&self, start_ns: i64) -> Measurement {
+        let stamp_ns = start_ns + (self.stamp_s() * 1e9).round() as i64;
+        match self {
+            Self::Odometry(s) => Measurement::Odometry(gripsight_signals::OdometrySample {
+                stamp_ns,
+                x_m: s.x_m,
+                y_m: s.y_m,
+                yaw_rad: wrap_angle(s.heading_rad),
+                v_x_mps: s.v_x_mps,
+                v_y_mps: s.v_y_mps,
+                yaw_rate_radps: s.yaw_rate_radps,
+            }),
+            Self::Drive(s) => Measurement::Drive(gripsight_signals::DriveSample {
+                stamp_ns,
+                steering_angle_rad: s.steering_rad,
+                speed_mps: s.speed_mps,
+                acceleration_mps2: s.acceleration_mps2,
+            }),
+            Self::Imu(s) => Measurement::Imu(gripsight_signals::ImuSample {
+                stamp_ns,
+                a_x_mps2: s.a_x_mps2,
+                a_y_mps2: s.a_y_mps2,
+                yaw_rate_radps: s.yaw_rate_radps,
+            }),
+            Self::Wheels(s) => Measurement::Wheels(gripsight_signals::WheelsSample {
+                stamp_ns,
+                speed: s.wheel_radps,
+                effort_nm: None,
+            }),
         }
     }
 }

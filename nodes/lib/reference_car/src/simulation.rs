@@ -12,6 +12,9 @@ use crate::sensors::{DriveSample, SensorSample, Sensors};
 use crate::steering::Steering;
 use crate::track::{Track, TrackPosition};
 
+/// Roll angle behind which no car comes back.
+const ROLLED_OVER_RAD: f64 = 0.9;
+
 /// What a run recorded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
@@ -103,7 +106,7 @@ impl Simulation {
         let total = (self.scenario.duration_s / self.scenario.step_s).round() as u64;
         let mut end = EndReason::Completed;
         while self.steps <= total {
-            if self.steps % (total / 100).max(1) == 0 {
+            if self.steps.is_multiple_of((total / 100).max(1)) {
                 progress(self.steps as f64 / total as f64);
             }
             if let Err(reason) = self.drive() {
@@ -111,7 +114,8 @@ impl Simulation {
                 break;
             }
         }
-        Recording { samples: self.drain(), truth: self.truth, end }
+        let (samples, truth) = self.drain();
+        Recording { samples, truth, end }
     }
 
     /// One step with the scenario's own driver.
@@ -187,17 +191,18 @@ impl Simulation {
         self.place = other.place;
     }
 
-    /// Takes what the sensors reported since the last call, by stamp.
-    pub fn drain(&mut self) -> Vec<SensorSample> {
+    /// Takes what the sensors reported since the last call, by stamp, and the truth at the odometry's stamps.
+    pub fn drain(&mut self) -> (Vec<SensorSample>, Vec<TruthSample>) {
         let mut samples = std::mem::take(&mut self.samples);
         samples.sort_by(|a, b| a.stamp_s().total_cmp(&b.stamp_s()));
-        samples
+        (samples, std::mem::take(&mut self.truth))
     }
 
     /// One step of the integration; the sensors report.
     ///
     /// # Errors
-    /// `NotFinite` when the state stops being finite; the car then keeps its last finite state.
+    /// `NotFinite` when the state stops being finite (the car then keeps its last finite state), `Rollover` when it lies on
+    /// its side.
     pub fn step(&mut self) -> Result<(), EndReason> {
         let (dt_s, time_s) = (self.scenario.step_s, self.time_s());
         self.place = self.place_now();
@@ -222,6 +227,9 @@ impl Simulation {
         }
         self.state = next;
         self.steps += 1;
+        if next.roll_rad.abs() > ROLLED_OVER_RAD {
+            return Err(EndReason::Rollover { time_s: self.time_s(), roll_rad: next.roll_rad });
+        }
         Ok(())
     }
 
@@ -299,9 +307,6 @@ impl Simulation {
         let time_s = self.time_s();
         let slow = self.scenario.car.low_speed_mps();
         let speed = s.v_x_mps.hypot(s.v_y_mps);
-        if s.roll_rad.abs() > 0.9 {
-            return Some(EndReason::Rollover { time_s, roll_rad: s.roll_rad });
-        }
         let slip_rad = s.v_y_mps.atan2(s.v_x_mps);
         if speed > slow && slip_rad.abs() > 1.0 {
             return Some(EndReason::Spin { time_s, slip_rad });

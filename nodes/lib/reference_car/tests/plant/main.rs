@@ -1,5 +1,8 @@
 //! Tests of the reference car as a whole: one binary.
 
+// Helpers of tests may fail like the tests themselves.
+#![allow(clippy::unwrap_used)]
+
 mod effects;
 mod independence;
 mod oracle;

@@ -1,0 +1,100 @@
+//! The node's parameters, as a scenario.
+
+use anyhow::bail;
+use gripsight_reference_car::{CarParameters, Course, DriverKind, EffectSetting, Friction, Scenario};
+use gripsight_runtime::{Descriptor, Node, Parameter};
+
+/// Longest run: the scenario must have an end, the node has none.
+const ENDLESS_S: f64 = 36_000.0;
+
+/// Who drives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Wheel {
+    /// The topic `drive`.
+    Topic,
+    /// The scenario's own driver.
+    Own,
+}
+
+/// What the parameters say.
+pub(crate) struct Settings {
+    pub(crate) scenario: Scenario,
+    pub(crate) wheel: Wheel,
+    /// Seconds of the car per second.
+    pub(crate) rate: Parameter<f64>,
+    pub(crate) publish_clock: bool,
+    /// Age from which a drive command no longer counts.
+    pub(crate) command_timeout_s: f64,
+}
+
+impl Settings {
+    /// Declares the parameters.
+    pub(crate) fn declare(node: &mut Node) -> anyhow::Result<Self> {
+        let text = |node: &mut Node, name: &str, default: &str, meaning: &str| {
+            node.parameter(name, default.to_owned(), Descriptor::new(meaning).read_only()).map(|p| p.get())
+        };
+        let car = text(node, "car", "f1tenth", "f1tenth, formula_student, race_car or passenger_car")?;
+        let track = text(node, "track", "club", "Name of a closed track")?;
+        let driver = text(node, "driver", "topic", "Who drives: topic, pure_pursuit or profile")?;
+        let effects = node.parameter(
+            "effects",
+            Vec::<String>::new(),
+            Descriptor::new("Effects at work: NAME, NAME=VALUE or NAME=PARAMETER:VALUE,...").read_only(),
+        )?;
+        let flag = |node: &mut Node, name: &str, default: bool, meaning: &str| {
+            node.parameter(name, default, Descriptor::new(meaning).read_only()).map(|p| p.get())
+        };
+        let reverse = flag(node, "reverse", false, "Drive the track clockwise")?;
+        let realistic = flag(
+            node,
+            "realistic",
+            true,
+            "Load transfers, relaxation and combined slip at the car's own size",
+        )?;
+        let publish_clock = flag(node, "publish_clock", false, "Publish /clock")?;
+        let mut number = |name: &str, default: f64, low: f64, high: f64, meaning: &str| {
+            node.parameter(name, default, Descriptor::new(meaning).range(low..=high).read_only())
+                .map(|p| p.get())
+        };
+        let mu = number("mu", 0.9, 0.01, 3.0, "Friction of the road")?;
+        let pace = number("pace", 0.8, 0.05, 2.0, "Share of the grip that the own driver plans to use")?;
+        let noise = number("noise", 1.0, 0.0, 100.0, "Sensor noise over its usual size")?;
+        let command_timeout_s = number(
+            "command_timeout_s",
+            0.5,
+            0.05,
+            60.0,
+            "Age from which a drive command no longer counts (s)",
+        )?;
+        let seed =
+            node.parameter("seed", 1_i64, Descriptor::new("Seed of noise, gusts and dither").read_only())?;
+        let rate = node.parameter(
+            "rate",
+            1.0,
+            Descriptor::new("Seconds of the car per second").range(0.01..=100.0),
+        )?;
+
+        let car = CarParameters::by_name(&car)?;
+        let course = Course::by_name(&track, &car, reverse)?;
+        let (wheel, kind) = match driver.as_str() {
+            "topic" => (Wheel::Topic, DriverKind::PurePursuit),
+            "pure_pursuit" => (Wheel::Own, DriverKind::PurePursuit),
+            "profile" => (Wheel::Own, DriverKind::Profile),
+            other => bail!("parameter driver: expected topic, pure_pursuit or profile, got {other}"),
+        };
+        let asked = effects.get().iter().map(|e| EffectSetting::parse(e)).collect::<Result<Vec<_>, _>>()?;
+        let mut scenario = Scenario::new(car)
+            .course(course)
+            .driver(kind, pace)
+            .friction(Friction::Uniform { mu })
+            .duration(ENDLESS_S)
+            .seed(seed.get().unsigned_abs());
+        if realistic {
+            scenario.effects = scenario.car.own_effects(mu);
+            scenario.effects.retain(|own| asked.iter().all(|a| a.name != own.name));
+        }
+        scenario.effects.extend(asked);
+        let sensors = scenario.sensors.scaled(noise);
+        Ok(Self { scenario: scenario.sensors(sensors), wheel, rate, publish_clock, command_timeout_s })
+    }
+}
