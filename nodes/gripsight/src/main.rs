@@ -5,6 +5,7 @@
 
 mod bag;
 mod camera;
+mod diagnose;
 mod friction;
 mod identify;
 mod invocation;
@@ -31,6 +32,7 @@ Results go to standard output, progress and logs to standard error; RUST_LOG=deb
 #[derive(Debug, Subcommand)]
 enum Command {
     Identify(identify::IdentifyArgs),
+    Diagnose(diagnose::DiagnoseArgs),
     Friction(friction::FrictionArgs),
     Simulate(simulate::SimulateArgs),
     Bag(bag::BagArgs),
@@ -70,6 +72,7 @@ fn main() -> ExitCode {
 fn run(command: Command) -> anyhow::Result<Outcome> {
     match command {
         Command::Identify(args) => identify::run(&args),
+        Command::Diagnose(args) => diagnose::run(&args),
         Command::Friction(args) => friction::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Bag(args) => bag::run(&args),

@@ -41,7 +41,9 @@ fn main() -> anyhow::Result<()> {
     let car = CarParameters::by_name(&car_name)?;
     let reference = drive(&car, None, 11)?;
     let vehicle = nominal(&car);
-    let mut csv = String::from("car,effect,true_size,verdict,named,confused_with,size,low,high,closed,nominal,retuned,after,ceiling,confidence,time_s\n");
+    let mut csv = String::from(
+        "car,effect,true_size,verdict,named,confused_with,size,low,high,closed,nominal,retuned,after,ceiling,confidence,time_s\n",
+    );
     for name in &names {
         let recording = match drive(&car, (name != "none").then_some(name.as_str()), 12) {
             Ok(r) => r,

@@ -14,7 +14,7 @@ use crate::recording::Recording;
 use crate::select::{Round, reweigh, round, thresholds};
 use crate::verdict::{Budget, decide, rank};
 use crate::windows::{HORIZON_S, NEEDED_S, Split, Windows, split};
-use crate::{GapError, place, pictures};
+use crate::{GapError, pictures, place};
 
 /// What is diagnosed, and with what.
 #[derive(Debug, Clone)]
@@ -55,7 +55,8 @@ pub fn diagnose(request: &Request<'_>, progress: &mut dyn FnMut(&str)) -> Result
     if windows.held_out.duration_s(recording.dt_s()) < LEAST_HELD_OUT_S && other.is_none() {
         windows = split(&recording, false);
     }
-    let usable_s = windows.training.duration_s(recording.dt_s()) + windows.held_out.duration_s(recording.dt_s());
+    let usable_s =
+        windows.training.duration_s(recording.dt_s()) + windows.held_out.duration_s(recording.dt_s());
     if usable_s < NEEDED_S {
         return Err(GapError::TooLittle {
             usable_s,
@@ -91,10 +92,13 @@ pub fn diagnose(request: &Request<'_>, progress: &mut dyn FnMut(&str)) -> Result
     let mut state = null.clone();
     let mut rounds: Vec<Round> = Vec::new();
     while rounds.len() <= thresholds::MOST_EFFECTS {
-        progress(&format!("comparing {} effects, round {}", library.len() - state.effects.len(), rounds.len() + 1));
+        progress(&format!(
+            "comparing {} effects, round {}",
+            library.len() - state.effects.len(),
+            rounds.len() + 1
+        ));
         let here = round(&engine, &state, &library, &search, rounds.len());
         let taken = here.taken;
-        if std::env::var("DBG").is_ok() { for (r, z) in here.refits.iter().zip(&here.lead_z).take(5) { eprintln!("   {} gain {:.0} of {:.0} (res {}) z {:.1} rel {:.2} lead {:.1} {:?}", r.effect.name(), r.gain, here.before.cost, here.before.fit.as_ref().map_or(0, |f| f.linearization.residuals), r.z, r.relative_size, z, r.state.of(r.effect)); } eprintln!("   sigma {:?} / {:?} excess {:?}", engine.sigma, recording.sigma, crate::select::channel_excess(&engine, &here.before, &search)); }
         let next = taken.and_then(|i| here.refits.get(i)).map(|r| r.state.clone());
         rounds.push(here);
         match next {
@@ -119,7 +123,8 @@ pub fn diagnose(request: &Request<'_>, progress: &mut dyn FnMut(&str)) -> Result
     let budget = budget(&engine, other.as_ref(), &windows, &nominal, &null, &state, &rounds);
     let verdict = decide(&budget, &rounds, &state);
     let effects = rank(&rounds, &state, &budget);
-    let scored_windows = if windows.held_out.windows.is_empty() { &windows.training } else { &windows.held_out };
+    let scored_windows =
+        if windows.held_out.windows.is_empty() { &windows.training } else { &windows.held_out };
     let on_all = split(&recording, false).training;
     let nominal_score = engine.score(&[], None, &nominal, &on_all);
     let detection_limits = rounds
@@ -226,7 +231,8 @@ fn informative(recording: &Recording) -> Result<(), GapError> {
     if v_y < 1e-6 {
         return Err(GapError::NoInformation {
             what: "v_y",
-            detail: "the odometry's lateral velocity is zero throughout: its estimator does not provide it".to_owned(),
+            detail: "the odometry's lateral velocity is zero throughout: its estimator does not provide it"
+                .to_owned(),
         });
     }
     Ok(())
@@ -282,8 +288,10 @@ fn large_slip_rad(engine: &Engine<'_>, null: &State, windows: &Windows) -> f64 {
     for w in &windows.windows {
         let run = &engine.recording.runs[w.segment];
         for k in (w.from..w.from + w.len).step_by(5) {
-            let state = gripsight_vehicle::State { v_y_mps: run.smooth[0][k], yaw_rate_radps: run.smooth[1][k] };
-            let input = gripsight_vehicle::Input { v_x_mps: run.v_x_mps[k], steering_rad: run.steering_rad[k] };
+            let state =
+                gripsight_vehicle::State { v_y_mps: run.smooth[0][k], yaw_rate_radps: run.smooth[1][k] };
+            let input =
+                gripsight_vehicle::Input { v_x_mps: run.v_x_mps[k], steering_rad: run.steering_rad[k] };
             let (f, r) = car.slip_angles_rad(&state, &input);
             slips.push(f.abs().max(r.abs()));
         }

@@ -53,7 +53,6 @@ pub(crate) struct State {
     pub(crate) starts: Vec<[f64; 2]>,
     pub(crate) cost: f64,
     pub(crate) window_costs: Vec<f64>,
-    pub(crate) on_bound: Vec<usize>,
     pub(crate) finite: bool,
     pub(crate) fit: Option<Box<Fit>>,
 }
@@ -163,7 +162,13 @@ impl<'a> Engine<'a> {
                     2 => trust.peak * mean[j],
                     _ => trust.curvature,
                 };
-                Parameter { start: values[j], low, high, free: true, prior: Some(Prior { mean: mean[j], sigma }) }
+                Parameter {
+                    start: values[j],
+                    low,
+                    high,
+                    free: true,
+                    prior: Some(Prior { mean: mean[j], sigma }),
+                }
             })
             .collect();
         let dt_s = self.recording.dt_s();
@@ -224,7 +229,6 @@ impl<'a> Engine<'a> {
             starts: fit.starts.clone(),
             cost: fit.linearization.cost,
             window_costs: fit.linearization.window_costs.clone(),
-            on_bound: fit.on_bound.clone(),
             finite: fit.stop != StopReason::NotFinite,
             fit: Some(Box::new(fit)),
         }
@@ -268,7 +272,13 @@ impl<'a> Engine<'a> {
         let model = self.model(effects, flexible);
         let parameters: Vec<Parameter> = values
             .iter()
-            .map(|&start| Parameter { start, low: f64::NEG_INFINITY, high: f64::INFINITY, free: false, prior: None })
+            .map(|&start| Parameter {
+                start,
+                low: f64::NEG_INFINITY,
+                high: f64::INFINITY,
+                free: false,
+                prior: None,
+            })
             .collect();
         let problem = Problem {
             model: &model,

@@ -14,7 +14,9 @@ pub enum GapError {
     #[error(transparent)]
     Vehicle(#[from] VehicleError),
     /// Too little of the recording can be used.
-    #[error("{usable_s:.1} s of {recorded_s:.1} s can be used (moving at over {least_speed_mps:.1} m/s, without gaps), at least {needed_s:.0} s are needed")]
+    #[error(
+        "{usable_s:.1} s of {recorded_s:.1} s can be used (moving at over {least_speed_mps:.1} m/s, without gaps), at least {needed_s:.0} s are needed"
+    )]
     TooLittle {
         /// Time that can be used.
         usable_s: f64,

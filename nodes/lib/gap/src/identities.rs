@@ -73,7 +73,11 @@ fn half(s: &Segment) -> usize {
 
 type Sides = (Vec<f64>, Vec<f64>);
 
-fn test(name: &'static str, segments: &[Segment], sides: &dyn Fn(&Segment, usize) -> Option<Sides>) -> Identity {
+fn test(
+    name: &'static str,
+    segments: &[Segment],
+    sides: &dyn Fn(&Segment, usize) -> Option<Sides>,
+) -> Identity {
     let mut pairs: Vec<(f64, f64)> = Vec::new();
     let mut rough: Vec<f64> = Vec::new();
     let mut fast: Vec<(f64, f64)> = Vec::new();
@@ -131,7 +135,8 @@ fn test(name: &'static str, segments: &[Segment], sides: &dyn Fn(&Segment, usize
 
 /// Correlation of the fastest changes, with outliers clipped.
 fn correlation(pairs: &[(f64, f64)]) -> f64 {
-    let scale = |f: &dyn Fn(&(f64, f64)) -> f64| median(pairs.iter().map(|p| f(p).abs()).collect()).max(1e-12);
+    let scale =
+        |f: &dyn Fn(&(f64, f64)) -> f64| median(pairs.iter().map(|p| f(p).abs()).collect()).max(1e-12);
     let (a, b) = (scale(&|p| p.0), scale(&|p| p.1));
     let clip = |v: f64| v.clamp(-3.0, 3.0);
     let (mut xy, mut xx, mut yy) = (0.0, 0.0, 0.0);

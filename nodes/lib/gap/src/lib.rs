@@ -1,9 +1,50 @@
 //! The sim-to-real gap: where it lies, which effect causes it, how far it shrinks.
+//!
+//! "Sim" is the single-track model of `gripsight_vehicle` on given tires, "real" a recording. [`diagnose`] goes this way:
+//!
+//! 1. [`Recording`]: even stretches, channels, noise of each channel, laps, kinematic identities ([`Identity`]).
+//! 2. Windows of 0.5 s with free starts (`gripsight_identification::shooting`); tires retuned first, under a stated [`TireTrust`].
+//! 3. One Jacobian of tires and all candidates ranks the effects of the library ([`EffectId`]); the best are refitted jointly with the
+//!    tires from several starts; the model without them is refitted from the winner. A winner is taken if it is certain, large
+//!    enough to matter, and closes enough of what remains; then the search goes on from there.
+//! 4. Open-loop rollouts of 1 s on held-out blocks (or another bag): nominal, retuned, with the effects, with flexible terms on top
+//!    (the ceiling), against the noise. Little explained of what could be: "none of these".
+//!
+//! Decisions rest on thresholds in one table (`select::thresholds`), fixed on development drives of the reference car.
+//!
+//! # Adding an effect
+//!
+//! An effect is one type in `effects/` that implements [`Effect`]: its [`EffectSpec`] (name, equation, source, parameters with
+//! units, null value, bounds, size that matters, what must be recorded and driven) and the hooks that it needs, written for any
+//! `Real`, so that derivatives are exact. Say, a constant side force F_y = c m (a crab wind):
+//!
+//! ```ignore
+//! pub(super) struct SideForce;
+//!
+//! impl Effect for SideForce {
+//!     const SPEC: EffectSpec = spec(
+//!         "side_force",
+//!         "v_y' += c",
+//!         "steady cross wind, to first order",
+//!         "straights in both directions",
+//!         &[both_sides("c_mps2", "m/s2", [0.3, 0.3])],
+//!     );
+//!
+//!     fn motion<T: Real>(p: &[T], _car: &Car<T>, _at: &Moment<T>, motion: &mut Motion<T>) {
+//!         motion.force_y_mps2 += p[0];
+//!     }
+//! }
+//! ```
+//!
+//! One line in the list `library!` of `effects/mod.rs` adds it to the search, the file format, `--without` and the tests: at its null value it
+//! must leave the nominal model exactly as it was. If its derivative vanishes there, say `flat_at_null` and give `starts`.
+
 mod diagnose;
 mod effects;
 mod engine;
 mod error;
 mod evaluate;
+mod extended_file;
 mod flexible;
 mod identities;
 mod model;
@@ -27,10 +68,11 @@ pub use effects::{Effect, EffectId, EffectSpec, Need, ParameterSpec, Reported};
 pub use engine::TireTrust;
 pub use error::GapError;
 pub use evaluate::Estimate;
+pub use extended_file::ExtendedModelFile;
 pub use identities::Identity;
 pub use outcome::{
-    DetectionLimit, Diagnosis, EffectParameter, GapBudget, Invisible, Place, RankedEffect, Series, TirePair, Verdict, Where,
+    DetectionLimit, Diagnosis, EffectParameter, GapBudget, Invisible, Place, RankedEffect, Series, TirePair,
+    Verdict, Where,
 };
 pub use recording::{Channel, Recording};
 pub use terms::{Axle, Axles, Car, Moment, Motion, Outputs};
-pub mod probe;

@@ -56,12 +56,6 @@ impl<'a> ExtendedModel<'a> {
         Self { recording, vehicle, effects: effects.to_vec(), flexible: None, substep_s }
     }
 
-    /// Where the parameters of the effect at a place of the list start, and how many there are.
-    pub(crate) fn place(&self, index: usize) -> (usize, usize) {
-        let from = BASE + self.effects[..index].iter().map(|e| e.spec().parameters.len()).sum::<usize>();
-        (from, self.effects[index].spec().parameters.len())
-    }
-
     /// Each effect with its parameters.
     pub(crate) fn with_parameters<'p, T>(&'p self, p: &'p [T]) -> impl Iterator<Item = (EffectId, &'p [T])> {
         let mut from = BASE;
@@ -83,8 +77,7 @@ impl<'a> ExtendedModel<'a> {
         let run_in = ((RUN_IN_S / run.dt_s).ceil() as usize).min(window.from);
         // One sample more than the window: delays interpolate with both neighbours.
         let to = (window.from + window.len + 1).min(run.len());
-        let series: Vec<T> =
-            run.steering_rad[window.from - run_in..to].iter().map(|&u| T::from(u)).collect();
+        let series: Vec<T> = run.steering_rad[window.from - run_in..to].iter().map(|&u| T::from(u)).collect();
         let mut series = delayed(&series, p[HOLD], run.dt_s);
         for (effect, values) in self.with_parameters(p) {
             effect.steer(values, &mut series, run.dt_s);
@@ -95,7 +88,8 @@ impl<'a> ExtendedModel<'a> {
     fn flatten<T: Real>(&self, outputs: &Outputs<T>, window: &Window, out: &mut Vec<T>) {
         let n = outputs.v_y_mps.len();
         let kinematic = self.kinematic(outputs, window);
-        let derived: Vec<T> = if self.recording.derived_a_y { self.derived_a_y(outputs, window) } else { Vec::new() };
+        let derived: Vec<T> =
+            if self.recording.derived_a_y { self.derived_a_y(outputs, window) } else { Vec::new() };
         let series: Vec<(&[T], T)> = self
             .recording
             .channels
@@ -224,5 +218,97 @@ impl Rollout for ExtendedModel<'_> {
             mean - middle * slope / square.max(1e-9)
         };
         [line(0), line(1)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gripsight_signals::StateSequence;
+    use gripsight_vehicle::{Input, SingleTrack, State};
+
+    fn recording(seconds: usize) -> Recording {
+        let n = 100 * seconds;
+        let at = |f: &dyn Fn(f32) -> f32| (0..n).map(|k| f(k as f32 * 0.01)).collect::<Vec<f32>>();
+        let noise = |k: usize, size: f32| size * (((k * 7919 + 13) % 1009) as f32 / 504.5 - 1.0);
+        let sequence = StateSequence {
+            time_s: at(&|t| t),
+            v_x_mps: at(&|t| 5.0 + (0.7 * t).sin()),
+            v_y_mps: (0..n).map(|k| noise(k, 0.02)).collect(),
+            yaw_rate_radps: (0..n).map(|k| (k as f32 * 0.02).sin() + noise(k + 5, 0.01)).collect(),
+            steering_rad: at(&|t| 0.08 * (3.0 * t).sin()),
+            a_x_mps2: (0..n).map(|k| noise(k + 9, 0.1)).collect(),
+            a_y_mps2: (0..n).map(|k| 5.0 * (k as f32 * 0.02).sin() + noise(k + 31, 0.1)).collect(),
+            ..StateSequence::default()
+        };
+        Recording::new(&sequence).unwrap()
+    }
+
+    fn tires() -> PacejkaParameters {
+        PacejkaParameters::from_array([7.0, 1.5, 1.0, 0.1, 8.0, 1.4, 0.95, -0.2])
+    }
+
+    #[test]
+    fn null_values_leave_the_nominal_model() {
+        let recording = recording(4);
+        let vehicle = VehicleParameters::f1tenth();
+        let window = Window { segment: 0, from: 120, len: 60 };
+        let run = &recording.runs[0];
+        let mut base = tires_to_parameters(&tires()).to_vec();
+        base.push(0.0);
+        // The nominal model, stepped by its own crate, on the same tires as the fit sees them.
+        let car = SingleTrack::new(&vehicle, &tires_from_parameters(&base));
+        let input = |k: usize| Input { v_x_mps: run.v_x_mps[k], steering_rad: run.steering_rad[k] };
+        let mut x = State { v_y_mps: 0.05, yaw_rate_radps: 0.4 };
+        let mut expected = vec![[x.v_y_mps, x.yaw_rate_radps]];
+        for k in window.from..window.from + window.len - 1 {
+            x = car.step(x, &input(k), &input(k + 1), run.dt_s, 0.0025);
+            expected.push([x.v_y_mps, x.yaw_rate_radps]);
+        }
+        let check = |effects: &[EffectId]| {
+            let model = ExtendedModel::new(&recording, &vehicle, effects, 0.0025);
+            let mut p = base.clone();
+            p.extend(effects.iter().flat_map(|e| e.spec().parameters.iter().map(|s| s.null)));
+            let out = model.predict(&p, [0.05, 0.4], &window);
+            for (k, e) in expected.iter().enumerate() {
+                approx::assert_relative_eq!(out.v_y_mps[k], e[0], max_relative = 1e-12, epsilon = 1e-14);
+                approx::assert_relative_eq!(
+                    out.yaw_rate_radps[k],
+                    e[1],
+                    max_relative = 1e-12,
+                    epsilon = 1e-14
+                );
+            }
+            (out.v_y_mps, out.yaw_rate_radps, out.a_y_mps2, out.heading_rad)
+        };
+        // Among themselves the models agree to the last bit, one effect at a time and all together.
+        let plain = check(&[]);
+        for &effect in EffectId::ALL {
+            assert_eq!(check(&[effect]), plain, "{}", effect.name());
+        }
+        assert_eq!(check(EffectId::ALL), plain);
+    }
+
+    #[test]
+    fn every_effect_shows_where_its_signals_are() {
+        let recording = recording(4);
+        let vehicle = VehicleParameters::f1tenth();
+        let window = Window { segment: 0, from: 120, len: 60 };
+        let mut base = tires_to_parameters(&tires()).to_vec();
+        base.push(0.0);
+        let run = |effects: &[EffectId], size: f64| {
+            let model = ExtendedModel::new(&recording, &vehicle, effects, 0.0025);
+            let mut p = base.clone();
+            for effect in effects {
+                p.extend(effect.spec().parameters.iter().map(|s| s.null + size * s.size[0]));
+            }
+            let out = model.predict(&p, [0.05, 0.4], &window);
+            [out.v_y_mps, out.yaw_rate_radps, out.a_y_mps2, out.a_x_mps2, out.v_x_mps]
+        };
+        let plain = run(&[], 0.0);
+        // Without a lap there is no patch.
+        for &effect in EffectId::ALL.iter().filter(|e| **e != EffectId::LowGripPatch) {
+            assert!(run(&[effect], 5.0) != plain, "{}", effect.name());
+        }
     }
 }

@@ -247,7 +247,8 @@ impl<T: Real> Mover<'_, '_, T> {
         };
         let front_y_n = if commanded { front_n * cos + sin * front_x_n } else { front_n * cos };
         let mut a_y = (rear_n + front_y_n) / car.mass_kg + motion.force_y_mps2;
-        let mut yaw_radps2 = (front_y_n * car.l_f_m - rear_n * car.l_r_m) / car.yaw_inertia_kgm2 + motion.yaw_radps2;
+        let mut yaw_radps2 =
+            (front_y_n * car.l_f_m - rear_n * car.l_r_m) / car.yaw_inertia_kgm2 + motion.yaw_radps2;
         if let Some(flexible) = &model.flexible {
             let own = model.flexible_parameters(self.p);
             let (more_y, more_yaw) = flexible.motion(own, &at, v_y, steady_rad, now.steering_rad);

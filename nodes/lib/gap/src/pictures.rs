@@ -38,8 +38,10 @@ fn slips(engine: &Engine<'_>, null: &State, all: &Windows) -> [f64; 2] {
     for w in &all.windows {
         let run = &engine.recording.runs[w.segment];
         for k in w.from..w.from + w.len {
-            let state = gripsight_vehicle::State { v_y_mps: run.smooth[0][k], yaw_rate_radps: run.smooth[1][k] };
-            let input = gripsight_vehicle::Input { v_x_mps: run.v_x_mps[k], steering_rad: run.steering_rad[k] };
+            let state =
+                gripsight_vehicle::State { v_y_mps: run.smooth[0][k], yaw_rate_radps: run.smooth[1][k] };
+            let input =
+                gripsight_vehicle::Input { v_x_mps: run.v_x_mps[k], steering_rad: run.steering_rad[k] };
             let (f, r) = car.slip_angles_rad(&state, &input);
             most = [most[0].max(f.abs()), most[1].max(r.abs())];
         }
@@ -122,7 +124,12 @@ fn horizon(engine: &Engine<'_>, nominal: &[f64], null: &State, state: &State, on
             let error = |effects: &[crate::EffectId], p: &[f64]| {
                 mean(&by_block(engine.recording, &windows, &engine.score(effects, None, p, &windows)))
             };
-            Some([h, error(&[], nominal), error(&[], &null.parameters), error(&state.effects, &state.parameters)])
+            Some([
+                h,
+                error(&[], nominal),
+                error(&[], &null.parameters),
+                error(&state.effects, &state.parameters),
+            ])
         })
         .collect()
 }

@@ -23,7 +23,8 @@ const BINS: usize = 6;
 /// Sorts the errors of a model on windows.
 pub(crate) fn places(engine: &Engine<'_>, values: &[f64], windows: &Windows, score: &Score) -> Where {
     let recording = engine.recording;
-    let scored: Vec<usize> = (0..recording.channels.len()).filter(|&c| recording.channels[c].scored()).collect();
+    let scored: Vec<usize> =
+        (0..recording.channels.len()).filter(|&c| recording.channels[c].scored()).collect();
     let samples = samples(engine, values, windows, score, &scored);
     let total: f64 = samples.iter().flat_map(|s| s.squares.iter()).sum::<f64>().max(1e-12);
     let mut out = Where::default();
@@ -42,7 +43,14 @@ pub(crate) fn places(engine: &Engine<'_>, values: &[f64], windows: &Windows, sco
     let both: f64 = samples.iter().map(|s| s.axles[0] + s.axles[1]).sum::<f64>().max(1e-12);
     for (axle, name) in ["front_axle", "rear_axle"].into_iter().enumerate() {
         let sum: f64 = samples.iter().map(|s| s.axles[axle]).sum();
-        out.axle.push(Place { low: 0.0, high: 0.0, unit: "1", channel: name, chi2_per_dof: sum / n, share: sum / both });
+        out.axle.push(Place {
+            low: 0.0,
+            high: 0.0,
+            unit: "1",
+            channel: name,
+            chi2_per_dof: sum / n,
+            share: sum / both,
+        });
     }
     let binned = |k: usize, unit: &'static str| bins(&samples, k, unit, total, scored.len());
     out.speed = binned(0, "m/s");
@@ -62,7 +70,8 @@ pub(crate) fn places(engine: &Engine<'_>, values: &[f64], windows: &Windows, sco
 pub(crate) fn heat(places: &Engine<'_>, values: &[f64], windows: &Windows, score: &Score) -> Vec<[f64; 3]> {
     const CELLS: usize = 8;
     let recording = places.recording;
-    let scored: Vec<usize> = (0..recording.channels.len()).filter(|&c| recording.channels[c].scored()).collect();
+    let scored: Vec<usize> =
+        (0..recording.channels.len()).filter(|&c| recording.channels[c].scored()).collect();
     let samples = samples(places, values, windows, score, &scored);
     let top = |k: usize| samples.iter().map(|s| s.values[k]).fold(1e-6, f64::max);
     let (v_top, a_top) = (top(0), top(1));
@@ -84,7 +93,13 @@ pub(crate) fn heat(places: &Engine<'_>, values: &[f64], windows: &Windows, score
         .collect()
 }
 
-fn samples(engine: &Engine<'_>, values: &[f64], windows: &Windows, score: &Score, scored: &[usize]) -> Vec<Sample> {
+fn samples(
+    engine: &Engine<'_>,
+    values: &[f64],
+    windows: &Windows,
+    score: &Score,
+    scored: &[usize],
+) -> Vec<Sample> {
     let recording = engine.recording;
     let model = engine.model(&[], None);
     let nominal = gripsight_vehicle::SingleTrack::new(engine.vehicle, &tires_from_parameters(&values[..8]));
@@ -101,8 +116,10 @@ fn samples(engine: &Engine<'_>, values: &[f64], windows: &Windows, score: &Score
             let error = |c: usize| measured[k * channels + c] - predicted[k * channels + c];
             let (s_v, s_r) = (recording.sigma[0], recording.sigma[1]);
             let axle = |x: f64| (error(0) + x * error(1)).powi(2) / (s_v * s_v + x * x * s_r * s_r);
-            let state = gripsight_vehicle::State { v_y_mps: run.smooth[0][at], yaw_rate_radps: run.smooth[1][at] };
-            let input = gripsight_vehicle::Input { v_x_mps: run.v_x_mps[at], steering_rad: run.steering_rad[at] };
+            let state =
+                gripsight_vehicle::State { v_y_mps: run.smooth[0][at], yaw_rate_radps: run.smooth[1][at] };
+            let input =
+                gripsight_vehicle::Input { v_x_mps: run.v_x_mps[at], steering_rad: run.steering_rad[at] };
             let (front, rear) = nominal.slip_angles_rad(&state, &input);
             let next = (at + 1).min(run.len() - 1);
             out.push(Sample {
@@ -126,15 +143,15 @@ fn samples(engine: &Engine<'_>, values: &[f64], windows: &Windows, score: &Score
 /// Bins with equally many samples.
 fn bins(samples: &[Sample], k: usize, unit: &'static str, total: f64, channels: usize) -> Vec<Place> {
     let all: Vec<f64> = samples.iter().map(|s| s.values[k]).collect();
-    let mut edges: Vec<f64> =
-        (0..=BINS).map(|i| quantile(all.clone(), i as f64 / BINS as f64)).collect();
+    let mut edges: Vec<f64> = (0..=BINS).map(|i| quantile(all.clone(), i as f64 / BINS as f64)).collect();
     edges.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
     edges
         .windows(2)
         .enumerate()
         .map(|(i, e)| {
             let last = i + 2 == edges.len();
-            let inside = |s: &&Sample| s.values[k] >= e[0] && (s.values[k] < e[1] || (last && s.values[k] <= e[1]));
+            let inside =
+                |s: &&Sample| s.values[k] >= e[0] && (s.values[k] < e[1] || (last && s.values[k] <= e[1]));
             let (mut n, mut sum) = (0.0, 0.0);
             for s in samples.iter().filter(inside) {
                 n += channels as f64;
@@ -169,7 +186,10 @@ fn frequency(engine: &Engine<'_>, values: &[f64], windows: &Windows, score: &Sco
             let Some(place) = recording.channels.iter().position(|&x| x == c) else { continue };
             let n = window.len;
             let error: Vec<f64> = (0..n)
-                .map(|k| (measured[k * channels + place] - predicted[k * channels + place]) / recording.sigma[place])
+                .map(|k| {
+                    (measured[k * channels + place] - predicted[k * channels + place])
+                        / recording.sigma[place]
+                })
                 .collect();
             for bin in 0..n / 2 {
                 let f_hz = bin as f64 / (n as f64 * dt_s);

@@ -130,7 +130,12 @@ impl Recording {
         let all_v: Vec<f64> = parts.iter().flat_map(|s| s.v_x_mps.iter().copied()).collect();
         let least_speed_mps = (0.25 * quantile(all_v, 0.9)).max(0.5);
         let Some(first) = parts.first() else {
-            return Err(GapError::TooLittle { usable_s: 0.0, recorded_s, needed_s: crate::windows::NEEDED_S, least_speed_mps });
+            return Err(GapError::TooLittle {
+                usable_s: 0.0,
+                recorded_s,
+                needed_s: crate::windows::NEEDED_S,
+                least_speed_mps,
+            });
         };
         let dt_s = first.dt_s;
         if dt_s > 1.0 / LEAST_RATE_HZ {
@@ -156,7 +161,18 @@ impl Recording {
             .collect();
         let weights = with_kinematic_weight(&channels, weights, &runs, &sigma);
         let derived_a_y = identities.iter().any(|i| i.name == crate::identities::LATERAL && !i.informative);
-        Ok(Self { runs, channels, sigma, weights, laps, has_command, derived_a_y, recorded_s, least_speed_mps, identities })
+        Ok(Self {
+            runs,
+            channels,
+            sigma,
+            weights,
+            laps,
+            has_command,
+            derived_a_y,
+            recorded_s,
+            least_speed_mps,
+            identities,
+        })
     }
 
     /// The channels that are explained.
@@ -177,7 +193,8 @@ impl Recording {
 
     /// Median speed of the samples that count.
     pub(crate) fn typical_speed_mps(&self) -> f64 {
-        let fast = self.runs.iter().flat_map(|r| r.v_x_mps.iter().copied()).filter(|v| *v > self.least_speed_mps);
+        let fast =
+            self.runs.iter().flat_map(|r| r.v_x_mps.iter().copied()).filter(|v| *v > self.least_speed_mps);
         median(fast.collect())
     }
 }
@@ -262,7 +279,12 @@ fn kinematic(v_x_mps: &[f64], s: &Segment) -> Vec<f64> {
 }
 
 /// The kinematic channel's weight from the noise of what it is made of, integrated over half a window.
-fn with_kinematic_weight(channels: &[Channel], mut weights: Vec<f64>, runs: &[Run], sigma: &[f64]) -> Vec<f64> {
+fn with_kinematic_weight(
+    channels: &[Channel],
+    mut weights: Vec<f64>,
+    runs: &[Run],
+    sigma: &[f64],
+) -> Vec<f64> {
     let of = |channel| channels.iter().position(|&c| c == channel).map_or(0.0, |c| sigma[c]);
     if let Some(place) = channels.iter().position(|&c| c == Channel::LateralKinematics) {
         let v_x = median(runs.iter().flat_map(|r| r.v_x_mps.iter().copied()).collect());

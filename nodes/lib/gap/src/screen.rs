@@ -30,7 +30,12 @@ pub(crate) struct Screening {
 const LEAST_INFORMATION: f64 = 1e-9;
 
 /// Screens candidates around a fitted state.
-pub(crate) fn screen(engine: &Engine<'_>, state: &State, candidates: &[EffectId], windows: &Windows) -> Screening {
+pub(crate) fn screen(
+    engine: &Engine<'_>,
+    state: &State,
+    candidates: &[EffectId],
+    windows: &Windows,
+) -> Screening {
     let mut effects = state.effects.clone();
     effects.extend(candidates);
     let mut values = state.parameters.clone();
@@ -117,4 +122,3 @@ fn cosine(information: &DMatrix<f64>, a: (usize, usize), b: (usize, usize)) -> f
         _ => 0.0,
     }
 }
-

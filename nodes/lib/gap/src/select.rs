@@ -96,7 +96,11 @@ pub(crate) fn reweigh(engine: &mut Engine<'_>, state: &State, windows: &Windows)
         .iter()
         .zip(recording.sigma.iter().zip(excess))
         .map(|(&weight, (noise, e))| {
-            if noise.is_finite() { weight.max(noise * (1.0 + MISFIT_SHARE * (e - 1.0).max(0.0)).sqrt()) } else { weight }
+            if noise.is_finite() {
+                weight.max(noise * (1.0 + MISFIT_SHARE * (e - 1.0).max(0.0)).sqrt())
+            } else {
+                weight
+            }
         })
         .collect();
 }
@@ -122,7 +126,13 @@ pub(crate) fn difference(windows: &Windows, a: &State, b: &State) -> (f64, f64) 
 }
 
 /// Refits one candidate on top of a state: from the linear step, and from its own starts; the best counts.
-fn refit(engine: &Engine<'_>, state: &State, screened: &Screened, windows: &Windows, extra: &[Vec<f64>]) -> Refit {
+fn refit(
+    engine: &Engine<'_>,
+    state: &State,
+    screened: &Screened,
+    windows: &Windows,
+    extra: &[Vec<f64>],
+) -> Refit {
     const FIRST: usize = 2;
     const REST: usize = 5;
     let effect = screened.effect;
@@ -245,8 +255,13 @@ pub(crate) fn round(
     if let Some(best) = refits.first() {
         // The model without the effect may have been stuck where the winner is not.
         let own = state.parameters.len();
-        let again =
-            engine.fit(&state.effects, &best.state.parameters[..own], Some(best.state.starts.clone()), windows, 10);
+        let again = engine.fit(
+            &state.effects,
+            &best.state.parameters[..own],
+            Some(best.state.starts.clone()),
+            windows,
+            10,
+        );
         if again.finite && again.cost < before.cost {
             before = again;
         }
@@ -254,14 +269,8 @@ pub(crate) fn round(
     for r in &mut refits {
         (r.gain, r.z) = difference(windows, &before, &r.state);
     }
-    let lead_z = refits
-        .iter()
-        .map(|r| difference(windows, &r.state, &refits[0].state).1)
-        .collect();
-    let taken = refits
-        .iter()
-        .take(1)
-        .position(|r| acceptable(r, &before, number));
+    let lead_z = refits.iter().map(|r| difference(windows, &r.state, &refits[0].state).1).collect();
+    let taken = refits.iter().take(1).position(|r| acceptable(r, &before, number));
     Round { refits, lead_z, screening, taken, before }
 }
 

@@ -24,10 +24,8 @@ pub(crate) fn stations(segments: &[Segment]) -> Laps {
     if segments.iter().any(|s| s.x_m.is_empty() || s.yaw_rad.is_empty()) {
         return none();
     }
-    let points: Vec<(f64, f64, f64)> = segments
-        .iter()
-        .flat_map(|s| (0..s.len()).map(|k| (s.x_m[k], s.y_m[k], s.yaw_rad[k])))
-        .collect();
+    let points: Vec<(f64, f64, f64)> =
+        segments.iter().flat_map(|s| (0..s.len()).map(|k| (s.x_m[k], s.y_m[k], s.yaw_rad[k]))).collect();
     let Some((from, to)) = first_lap(&points) else { return none() };
     let ruler = &points[from..=to];
     let mut along = vec![0.0];

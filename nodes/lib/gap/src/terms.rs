@@ -55,7 +55,8 @@ impl<T: Real> Car<T> {
     /// The axles at rest.
     pub(crate) fn axles_at_rest(&self) -> Axles<T> {
         let weight_n = self.mass_kg * GRAVITY_MPS2;
-        let axle = |load_n| Axle { load_n, steer_rad: T::from(0.0), grip: T::from(1.0), usable: T::from(1.0) };
+        let axle =
+            |load_n| Axle { load_n, steer_rad: T::from(0.0), grip: T::from(1.0), usable: T::from(1.0) };
         Axles {
             front: axle(weight_n * self.l_r_m / self.wheelbase_m()),
             rear: axle(weight_n * self.l_f_m / self.wheelbase_m()),
@@ -175,7 +176,11 @@ pub struct Outputs<T> {
 pub(crate) fn lagged<T: Real>(y0: T, u0: T, u1: T, h_s: f64, tau_s: T) -> T {
     let ramp = (u1 - u0) / h_s * tau_s;
     let settled = u1 - ramp;
-    if tau_s.re() < h_s / 30.0 { settled } else { settled + (y0 - u0 + ramp) * (-(tau_s.recip() * h_s)).exp() }
+    if tau_s.re() < h_s / 30.0 {
+        settled
+    } else {
+        settled + (y0 - u0 + ramp) * (-(tau_s.recip() * h_s)).exp()
+    }
 }
 
 /// A series `delay_s` later, linear between samples; before the first sample it is taken as going on straight.

@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use crate::outcome::{Diagnosis, Place};
 use crate::Estimate;
+use crate::outcome::{Diagnosis, Place};
 
 impl Diagnosis {
     /// The diagnosis in some 25 lines.
@@ -28,7 +28,11 @@ impl Diagnosis {
             let _ = writeln!(out, "identity   {}: {}", identity.name, identity.finding);
         }
         let gap = &self.gap;
-        let _ = writeln!(out, "gap        mean squared error over noise, {} s rollouts, {}", gap.horizon_s, gap.scored_on);
+        let _ = writeln!(
+            out,
+            "gap        mean squared error over noise, {} s rollouts, {}",
+            gap.horizon_s, gap.scored_on
+        );
         for (name, e) in [
             ("nominal", gap.nominal),
             ("retuned", gap.retuned),
@@ -38,7 +42,11 @@ impl Diagnosis {
         ] {
             let _ = writeln!(out, "  {name:<9}{}", figure(e));
         }
-        let _ = writeln!(out, "closed     {} of the gap between retuned tires and noise", figure(self.gap_closed_fraction));
+        let _ = writeln!(
+            out,
+            "closed     {} of the gap between retuned tires and noise",
+            figure(self.gap_closed_fraction)
+        );
         for e in self.effects.iter().take(5) {
             let mark = if e.accepted { '*' } else { ' ' };
             let parameters: Vec<String> = e
@@ -46,7 +54,11 @@ impl Diagnosis {
                 .iter()
                 .map(|(name, p)| format!("{name} {:.4} [{:.4}, {:.4}]", p.value, p.low, p.high))
                 .collect();
-            let group = if e.confused_with.is_empty() { String::new() } else { format!(" or {}", e.confused_with.join(", ")) };
+            let group = if e.confused_with.is_empty() {
+                String::new()
+            } else {
+                format!(" or {}", e.confused_with.join(", "))
+            };
             let _ = writeln!(
                 out,
                 "{mark} {:<26} {}  closes {:.0} %  sure {:.2}{group}",
@@ -57,10 +69,19 @@ impl Diagnosis {
             );
         }
         if let Some(worst) = worst(&self.places.channel) {
-            let _ = writeln!(out, "where      {} holds {:.0} % of the squared error", worst.channel, 100.0 * worst.share);
+            let _ = writeln!(
+                out,
+                "where      {} holds {:.0} % of the squared error",
+                worst.channel,
+                100.0 * worst.share
+            );
         }
         if let Some(p) = worst(&self.places.lateral_acceleration) {
-            let _ = writeln!(out, "           most at {:.1} to {:.1} {} of lateral acceleration", p.low, p.high, p.unit);
+            let _ = writeln!(
+                out,
+                "           most at {:.1} to {:.1} {} of lateral acceleration",
+                p.low, p.high, p.unit
+            );
         }
         if !self.invisible.is_empty() {
             let names: Vec<&str> = self.invisible.iter().map(|i| i.name).collect();

@@ -86,7 +86,10 @@ pub(crate) fn decide(budget: &Budget, rounds: &[Round], state: &State) -> (Verdi
         let explainable = (retuned - ceiling) / excess;
         reasons.push(format!("flexible terms would explain {:.0} % of the gap", 100.0 * explainable));
         if let Some(best) = best {
-            reasons.push(format!("the best effect, {}, does not explain enough of it to be named", best.effect.name()));
+            reasons.push(format!(
+                "the best effect, {}, does not explain enough of it to be named",
+                best.effect.name()
+            ));
         }
         return (Verdict::NoneOfThese, reasons);
     }
@@ -211,7 +214,8 @@ fn parameters(state: &State, effect: EffectId) -> BTreeMap<&'static str, EffectP
             .enumerate()
             .map(|(i, r)| {
                 let half = 1.645 * errors[i];
-                let p = EffectParameter { value: own[i], low: own[i] - half, high: own[i] + half, unit: r.unit };
+                let p =
+                    EffectParameter { value: own[i], low: own[i] - half, high: own[i] + half, unit: r.unit };
                 (r.name, p)
             })
             .collect();
@@ -245,7 +249,12 @@ pub(crate) fn drive_next(effects: &[RankedEffect]) -> Vec<String> {
             .filter_map(EffectId::by_name)
             .map(|id| format!("{} ({})", id.spec().excitation, id.name()))
             .collect();
-        out.push(format!("to tell {} from {}: {}", e.name, e.confused_with.join(", "), manoeuvres.join("; ")));
+        out.push(format!(
+            "to tell {} from {}: {}",
+            e.name,
+            e.confused_with.join(", "),
+            manoeuvres.join("; ")
+        ));
     }
     out
 }

@@ -80,7 +80,13 @@ impl Effect for ComplianceSteer {
         "d -= c F_yf/F_zf",
         "elastic steering and suspension; Milliken, Race Car Vehicle Dynamics, chapter 23",
         "medium lateral acceleration, transients",
-        &[ParameterSpec { name: "rad_per_g", unit: "rad/g", null: 0.0, size: [0.015, 0.008], range: [-2.0, 5.0] }],
+        &[ParameterSpec {
+            name: "rad_per_g",
+            unit: "rad/g",
+            null: 0.0,
+            size: [0.015, 0.008],
+            range: [-2.0, 5.0],
+        }],
     );
 
     fn loads<T: Real>(p: &[T], _car: &Car<T>, at: &Moment<T>, axles: &mut Axles<T>) {
@@ -129,6 +135,7 @@ impl Effect for DifferentialYawMoment {
         let length_m = car.wheelbase_m();
         let share = if at.force_x_mps2 > 0.0 { 1.0 } else { OFF_POWER };
         let turn = (at.yaw_rate_radps * length_m / at.v_x_mps).tanh();
-        motion.yaw_radps2 -= p[0] * car.mass_kg * (GRAVITY_MPS2 * share) * length_m * turn / car.yaw_inertia_kgm2;
+        motion.yaw_radps2 -=
+            p[0] * car.mass_kg * (GRAVITY_MPS2 * share) * length_m * turn / car.yaw_inertia_kgm2;
     }
 }

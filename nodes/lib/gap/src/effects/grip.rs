@@ -94,8 +94,20 @@ impl Effect for LowGripPatch {
             "two or more passes above 60 % of the limit",
             &[
                 ParameterSpec { name: "depth", unit: "1", null: 0.0, size: [0.2, 0.2], range: [0.0, 4.0] },
-                ParameterSpec { name: "start_share", unit: "lap", null: 0.5, size: [1.0, 1.0], range: [-1.0, 1.0] },
-                ParameterSpec { name: "length_share", unit: "lap", null: 0.05, size: [0.05, 0.05], range: [-0.7, 3.0] },
+                ParameterSpec {
+                    name: "start_share",
+                    unit: "lap",
+                    null: 0.5,
+                    size: [1.0, 1.0],
+                    range: [-1.0, 1.0],
+                },
+                ParameterSpec {
+                    name: "length_share",
+                    unit: "lap",
+                    null: 0.05,
+                    size: [0.05, 0.05],
+                    range: [-0.7, 3.0],
+                },
             ],
         )
     };
@@ -125,7 +137,13 @@ impl Effect for TireWear {
         "D (1 - rate t)",
         "wear and heat of the tires over a run, to first order",
         "a long run near the limit",
-        &[ParameterSpec { name: "rate_per_min", unit: "1/min", null: 0.0, size: [0.06, 0.06], range: [-5.0, 10.0] }],
+        &[ParameterSpec {
+            name: "rate_per_min",
+            unit: "1/min",
+            null: 0.0,
+            size: [0.06, 0.06],
+            range: [-5.0, 10.0],
+        }],
     );
 
     fn grip<T: Real>(p: &[T], _car: &Car<T>, at: &Moment<T>, axles: &mut Axles<T>) {
@@ -133,11 +151,3 @@ impl Effect for TireWear {
         scale(axles, factor, factor);
     }
 }
-
-/// Grip lost at places of the lap, as steps between nodes: how the search for a patch starts, never a candidate itself.
-pub(crate) fn place_weights(lap_share: f64, places: usize) -> (usize, usize, f64) {
-    let at = lap_share.rem_euclid(1.0) * places as f64;
-    let left = (at.floor() as usize).min(places - 1);
-    (left, (left + 1) % places, at - left as f64)
-}
-

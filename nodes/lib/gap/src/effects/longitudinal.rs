@@ -18,7 +18,13 @@ impl Effect for AeroDrag {
             "F_x -= c m v^2 (m nominal)",
             "drag of a bluff body",
             "top speed",
-            &[ParameterSpec { name: "c_1pm", unit: "1/m", null: 0.0, size: [8e-3, 8e-4], range: [-1.0, 5.0] }],
+            &[ParameterSpec {
+                name: "c_1pm",
+                unit: "1/m",
+                null: 0.0,
+                size: [8e-3, 8e-4],
+                range: [-1.0, 5.0],
+            }],
         )
     };
 

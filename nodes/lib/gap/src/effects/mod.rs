@@ -48,7 +48,9 @@ impl Need {
             Self::LongitudinalCommand => "no longitudinal command is recorded",
             Self::Accelerometer => "no accelerometer is recorded",
             Self::Laps => "no pose over at least one and a half laps is recorded",
-            Self::ReferenceTires => "with the tires free it is the same as other tires: give --pacejka or a reference bag",
+            Self::ReferenceTires => {
+                "with the tires free it is the same as other tires: give --pacejka or a reference bag"
+            }
         }
     }
 }
@@ -282,7 +284,11 @@ mod tests {
             let spec = effect.spec();
             assert!(!spec.parameters.is_empty() && !spec.equation.is_empty() && !spec.source.is_empty());
             for p in spec.parameters {
-                assert!(p.size.iter().all(|s| *s > 0.0) && p.range[0] <= 0.0 && p.range[1] > 0.0, "{}", p.name);
+                assert!(
+                    p.size.iter().all(|s| *s > 0.0) && p.range[0] <= 0.0 && p.range[1] > 0.0,
+                    "{}",
+                    p.name
+                );
             }
         }
         assert_eq!(EffectId::by_name("magic"), None);

@@ -139,7 +139,13 @@ impl Effect for SteeringRateLimit {
             "abs(d') <= rate",
             "slew rate of the servo or the power steering",
             "fast steering",
-            &[ParameterSpec { name: "s_per_rad", unit: "s/rad", null: 0.0, size: [0.4, 2.0], range: [0.0, 6.0] }],
+            &[ParameterSpec {
+                name: "s_per_rad",
+                unit: "s/rad",
+                null: 0.0,
+                size: [0.4, 2.0],
+                range: [0.0, 6.0],
+            }],
         )
     };
 

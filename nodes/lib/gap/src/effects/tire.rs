@@ -51,9 +51,11 @@ impl Effect for CombinedSlip {
         for (axle, share, peak) in
             [(&mut axles.front, front, car.peak[0]), (&mut axles.rear, 1.0 - front, car.peak[1])]
         {
-            let use_x = (peak * axle.grip * axle.load_n).recip() * (at.force_x_mps2 * car.nominal_mass_kg * share);
+            let use_x =
+                (peak * axle.grip * axle.load_n).recip() * (at.force_x_mps2 * car.nominal_mass_kg * share);
             let square = T::from(1.0) - p[0] * use_x * use_x;
-            axle.usable *= if square.re() < LEAST_SQUARE { T::from(LEAST_SQUARE.sqrt()) } else { square.sqrt() };
+            axle.usable *=
+                if square.re() < LEAST_SQUARE { T::from(LEAST_SQUARE.sqrt()) } else { square.sqrt() };
         }
     }
 }

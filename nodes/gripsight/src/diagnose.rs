@@ -1,0 +1,172 @@
+//! `gripsight diagnose`: where model and car disagree, which effect causes it, how much of it goes away.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Context, bail};
+use clap::Args;
+use gripsight_bag::{ReadReport, TopicMap, read_sequences};
+use gripsight_gap::{Diagnosis, EffectId, Request, Verdict, diagnose};
+use gripsight_identification::export::read_tires;
+use gripsight_identification::vehicle_hash;
+use gripsight_report::{GapInput, Header, gap_page};
+use gripsight_signals::{StateSequence, WindowConfig};
+use gripsight_vehicle::VehicleParameters;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+use crate::Outcome;
+use crate::invocation::invocation;
+
+/// Explain where the model and the real car disagree.
+///
+/// With one BAG the model is the single-track model on the tires of --pacejka, or on tires identified from the bag's training
+/// blocks. With two, BAG is compared with BAG2: what has changed from the first drive to the second.
+///
+/// DIR receives gap.json, report.html, timing.json and extended_model.yaml (the named effects with their parameters).
+/// Exit code 3: the data cannot tell.
+#[derive(Debug, Args)]
+#[command(after_help = names())]
+pub(crate) struct DiagnoseArgs {
+    /// An .mcap file or a rosbag2 folder.
+    bag: PathBuf,
+    /// A later drive of the same car, to be compared with the first.
+    bag2: Option<PathBuf>,
+    /// Another drive of the car in the same state, to score on; without it every fourth block is held out.
+    #[arg(long, value_name = "BAG")]
+    heldout: Option<PathBuf>,
+    /// The car, as a ROS 2 parameter file; without it, an F1TENTH-class 1:10 car.
+    #[arg(long, value_name = "FILE")]
+    vehicle: Option<PathBuf>,
+    /// The tires of the model: pacejka.yaml or <car>_pacejka.txt; trusted to a few percent.
+    #[arg(long, value_name = "FILE", conflicts_with = "bag2")]
+    pacejka: Option<PathBuf>,
+    /// Leave an effect out of the library. May be repeated.
+    #[arg(long, value_name = "EFFECT")]
+    without: Vec<String>,
+    /// Consider only this effect. May be repeated.
+    #[arg(long, value_name = "EFFECT", conflicts_with = "without")]
+    only: Vec<String>,
+    /// A file that maps names to topics, such as `odom: /car_state/odom`; without it topics are found by type.
+    #[arg(long, value_name = "FILE")]
+    topics: Option<PathBuf>,
+    /// Where the files go; made if it is not there.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+fn names() -> String {
+    let effects: Vec<&str> = EffectId::ALL.iter().map(|e| e.name()).collect();
+    format!("Effects: {}", effects.join(", "))
+}
+
+#[derive(Serialize)]
+struct Timing {
+    reading_s: f64,
+    diagnosing_s: f64,
+    total_s: f64,
+}
+
+/// Runs the subcommand.
+pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
+    let start = Instant::now();
+    let topics = args.topics.as_deref().map(TopicMap::read).transpose()?.unwrap_or_default();
+    let vehicle = vehicle(args.vehicle.as_deref())?;
+    let tires = args.pacejka.as_deref().map(tires).transpose()?;
+    // The drive that is explained is the later one; the earlier one says what the tires were.
+    let subject = args.bag2.as_deref().unwrap_or(&args.bag);
+    let (sequence, report) = read(subject, &topics)?;
+    let reference = args.bag2.as_ref().map(|_| read(&args.bag, &topics)).transpose()?;
+    let held_out = args.heldout.as_deref().map(|path| read(path, &topics)).transpose()?;
+    let reading_s = start.elapsed().as_secs_f64();
+    let spinner = ProgressBar::new_spinner().with_style(ProgressStyle::with_template("{spinner} {msg} {elapsed}")?);
+    let request = Request {
+        sequence: &sequence,
+        held_out: held_out.as_ref().map(|h| &h.0),
+        reference: reference.as_ref().map(|r| &r.0),
+        vehicle: &vehicle,
+        tires,
+        without: &args.without,
+        only: &args.only,
+    };
+    let result = diagnose(&request, &mut |stage| {
+        spinner.set_message(stage.to_owned());
+        spinner.tick();
+        tracing::debug!("{stage}");
+    })
+    .with_context(|| format!("cannot diagnose {}", subject.display()))?;
+    spinner.finish_and_clear();
+    let diagnosing_s = start.elapsed().as_secs_f64() - reading_s;
+    fs::create_dir_all(&args.out).with_context(|| format!("cannot make {}", args.out.display()))?;
+    let header = header(subject, &vehicle, &sequence);
+    let page = gap_page(&GapInput { diagnosis: &result, header: &header, data_notes: &data_notes(&report) })?;
+    let timing = Timing { reading_s, diagnosing_s, total_s: start.elapsed().as_secs_f64() };
+    for (name, text) in [
+        ("gap.json", serde_json::to_string_pretty(&result)? + "\n"),
+        ("report.html", page),
+        ("extended_model.yaml", result.extended_model().to_yaml()?),
+        ("timing.json", serde_json::to_string_pretty(&timing)? + "\n"),
+    ] {
+        let path = args.out.join(name);
+        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    print!("{}", result.text());
+    println!("files      {} (gap.json, report.html, extended_model.yaml, timing.json)", args.out.display());
+    Ok(outcome(&result))
+}
+
+fn outcome(result: &Diagnosis) -> Outcome {
+    if result.verdict == Verdict::NotIdentifiable { Outcome::NotAccepted } else { Outcome::Done }
+}
+
+fn vehicle(path: Option<&Path>) -> anyhow::Result<VehicleParameters> {
+    let Some(path) = path else {
+        tracing::warn!("no --vehicle: taking the values of an F1TENTH-class 1:10 car");
+        return Ok(VehicleParameters::f1tenth());
+    };
+    let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    VehicleParameters::from_ros_yaml(&text).with_context(|| format!("cannot use {}", path.display()))
+}
+
+fn tires(path: &Path) -> anyhow::Result<gripsight_vehicle::PacejkaParameters> {
+    let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    read_tires(&text).with_context(|| format!("cannot use {}", path.display()))
+}
+
+/// The longest recorded sequence, or everything in one.
+fn read(path: &Path, topics: &TopicMap) -> anyhow::Result<(StateSequence, ReadReport)> {
+    let whole = WindowConfig { length_s: f64::INFINITY, hop_s: f64::INFINITY };
+    let (sequences, report) =
+        read_sequences(path, topics, whole).with_context(|| format!("cannot read {}", path.display()))?;
+    let longest = sequences.into_iter().max_by(|a, b| a.duration_s().total_cmp(&b.duration_s()));
+    match longest {
+        Some(sequence) => Ok((sequence, report)),
+        None => bail!("{}: no state sequence", path.display()),
+    }
+}
+
+fn header(bag: &Path, vehicle: &VehicleParameters, sequence: &StateSequence) -> Header {
+    let stem = || bag.file_stem().map(|s| s.to_string_lossy().into_owned());
+    Header {
+        car: vehicle.name.clone().or_else(stem).unwrap_or_else(|| "car".into()),
+        bag: bag.file_name().unwrap_or(bag.as_os_str()).to_string_lossy().into_owned(),
+        data_stamp: format!("{:.3} s since 1970", sequence.start_stamp_ns as f64 * 1e-9),
+        tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+        vehicle_hash: vehicle_hash(vehicle),
+        seed: None,
+        command: invocation(std::env::args()),
+    }
+}
+
+/// What reading the bag met, in sentences.
+fn data_notes(report: &ReadReport) -> Vec<String> {
+    let mut notes: Vec<String> = report.truncated.clone().into_iter().collect();
+    if report.without_drive > 0 {
+        notes.push(format!("{} odometry messages left out: no drive command in force", report.without_drive));
+    }
+    if report.duplicates > 0 {
+        notes.push(format!("{} messages left out: a stamp seen before", report.duplicates));
+    }
+    notes
+}
