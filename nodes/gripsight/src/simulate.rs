@@ -9,7 +9,7 @@ use clap::Args;
 use gripsight_bag::{BagWriter, encode};
 use gripsight_reference_car::{
     CAR_NAMES, CarParameters, Course, DriverKind, EFFECTS, EffectSetting, Friction, MANOEUVRE_NAMES,
-    Recording, Scenario, SensorSample, Simulation, TRACK_NAMES, write_truth_csv,
+    Recording, Scenario, Simulation, TRACK_NAMES, write_truth_csv,
 };
 use gripsight_signals::Measurement;
 use indicatif::{ProgressBar, ProgressStyle};
