@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use gripsight_identification::{AcceptedSet, PerAxle, RunKey, SignalCorrections};
+use gripsight_identification::{AcceptedSet, Nuisance, PerAxle, RunKey, SignalCorrections};
 use gripsight_vehicle::PacejkaParameters;
 use serde::Deserialize;
 
@@ -14,6 +14,7 @@ struct Earlier {
     accepted: bool,
     phi_p: PacejkaParameters,
     signals: SignalCorrections,
+    nuisance: Nuisance,
     peak_friction: PerAxle<Peak>,
     rmse: Errors,
     key: RunKey,
@@ -53,6 +54,7 @@ pub(super) fn read(path: &Path) -> anyhow::Result<AcceptedSet> {
         sequence_id: earlier.key.sequence_id,
         phi_p: earlier.phi_p,
         corrections: earlier.signals,
+        nuisance: Nuisance { combined_slip: 0.0, ..earlier.nuisance },
         rollout_rmse: [earlier.rmse.rollout.v_y_mps.after, earlier.rmse.rollout.yaw_rate_radps.after],
         peak_reached: earlier.peak_friction.map(|p| p.reached),
     })

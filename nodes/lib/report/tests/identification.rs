@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use gripsight_identification::{
-    Change, Config, Estimate, FrictionPrior, HorizonError, IterationRecord, Outcome, PeakFriction, PerAxle,
-    Range, Rmse, RmseReport, RunKey, SignalCorrections, SignalEstimates, Source, TireCurve, Trace,
+    Change, Config, Estimate, FrictionPrior, HorizonError, IterationRecord, Nuisance, Outcome, PeakFriction,
+    PerAxle, Range, Rmse, RmseReport, RunKey, SignalCorrections, SignalEstimates, Source, TireCurve, Trace,
     WeakSignal,
 };
 use gripsight_report::{Header, IdentificationInput, identification_page};
@@ -77,6 +77,7 @@ fn outcome() -> Outcome {
             yaw_rate_bias_radps: estimate(0.0, 0.003),
         },
         weak_signals: vec![WeakSignal { name: "yaw_rate_bias_radps", data_share: 0.04, prior_sigma: 0.01 }],
+        nuisance: Nuisance { relaxation_m: 0.05, combined_slip: 0.3 },
         rmse: RmseReport { one_step: rmse(1.1), rollout: rmse(2.3), horizon_s: 1.0, noise: [0.01, 0.02] },
         rollout_error: (1..=20)
             .map(|k| f64::from(k) * 0.1)
@@ -193,4 +194,19 @@ fn the_verdict_says_what_the_figures_rest_on() {
         html.contains("<h1 class=\"caution\">Not accepted: the peak was not reached and there is no prior.")
     );
     assert!(html.contains("front unknown, peak not reached"));
+}
+
+#[test]
+fn a_refused_run_makes_a_page_without_pictures() {
+    let mut refused = outcome();
+    refused.accepted = false;
+    refused.source = Source::Start;
+    refused.reasons = vec!["the car hardly turned".into()];
+    refused.curves = PerAxle::default();
+    refused.rollout_error.clear();
+    refused.history.clear();
+    refused.trace = Trace::default();
+    let html = page(&refused);
+    assert!(!html.contains("<figure>") && html.contains("Not accepted: the car hardly turned"));
+    assert!(html.contains("Tires that the run started from"));
 }

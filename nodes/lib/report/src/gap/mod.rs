@@ -30,7 +30,6 @@ pub fn gap_page(input: &GapInput<'_>) -> Result<String, ReportError> {
     let [front, rear] = pictures::tire_curves(d);
     let [v_y, yaw_rate] = pictures::worst_seconds(d);
     let (heat, scale) = pictures::heat(d);
-    let horizon = d.gap.horizon_s;
     let drawn = !d.series.horizon.is_empty();
     let body = html! {
         (section("How large the gap is", true, &tables::budget(d)))
@@ -51,12 +50,6 @@ pub fn gap_page(input: &GapInput<'_>) -> Result<String, ReportError> {
         (section("What these signals cannot show", false, &facts_table(&tables::invisible(d))))
         (section("Kinematics", false, &facts_table(&tables::identities(d))))
         (section("Data", false, &tables::data(d, input.data_notes)))
-        (section("How it was measured", true, &html! {
-            p {
-                "Mean squared error of open-loop rollouts of " (crate::text::significant(horizon, 2)) " s on " (d.gap.scored_on)
-                ", each channel over its noise (" (tables::noise(d)) "). Intervals are 90 %, by block bootstrap."
-            }
-        }))
     };
     let tone = match d.verdict {
         Verdict::Effects | Verdict::TireRetuneOnly | Verdict::NoGap => Tone::Good,

@@ -7,6 +7,9 @@ use crate::chart::heat as heat_color;
 use crate::text::significant;
 use crate::{Axis, Chart, Layer, Role};
 
+/// The diagnosis sorts errors into so many cells from 0 to the largest value on either axis; the last is never empty.
+const GRID: f64 = 8.0;
+
 /// Force over slip without and with the effects, front and rear.
 pub(super) fn tire_curves(d: &Diagnosis) -> [Chart; 2] {
     let axle = |title: &str, k: usize| {
@@ -20,6 +23,7 @@ pub(super) fn tire_curves(d: &Diagnosis) -> [Chart; 2] {
         };
         let with_effects = d.effects.iter().any(|e| e.accepted);
         let chart = Chart::new(title, Axis::new("slip angle / °").with_range(0.0, end_deg), force_axis())
+            .sized(460, 230)
             .with(Layer::Unvisited { name: "slip not driven".into(), from: driven_deg, to: end_deg })
             .with(line(Role::Nominal, "fitted without effects", 1));
         if with_effects { chart.with(line(Role::Identified, "with the effects named", 2)) } else { chart }
@@ -52,11 +56,13 @@ pub(super) fn worst_seconds(d: &Diagnosis) -> [Chart; 2] {
 /// Error over speed and lateral acceleration, and its scale.
 pub(super) fn heat(d: &Diagnosis) -> (Chart, Markup) {
     let cells = &d.series.heat;
-    let half = |k: usize| spacing(cells.iter().map(|c| c[k])) / 2.0;
+    let half = |k: usize| cells.iter().map(|c| c[k]).fold(0.0, f64::max) / (GRID - 0.5) / 2.0;
     let (half_v, half_a) = (half(0), half(1));
-    let most = cells.iter().map(|c| c[2]).filter(|c| c.is_finite()).fold(0.0, f64::max).max(2.0);
-    // By the logarithm, from the noise upwards: a regime ten times as bad must not hide one three times as bad.
-    let share = |chi2: f64| (chi2.max(1.0).ln() / most.ln()).min(1.0);
+    let finite = || cells.iter().map(|c| c[2]).filter(|c| c.is_finite());
+    let least = finite().fold(f64::INFINITY, f64::min).clamp(1.0, f64::MAX);
+    let most = finite().fold(2.0 * least, f64::max);
+    // By the logarithm: a regime ten times as bad must not hide one three times as bad. The lowest colour is not quite white.
+    let share = |chi2: f64| 0.08 + 0.92 * ((chi2.max(least) / least).ln() / (most / least).ln()).min(1.0);
     let cells = cells
         .iter()
         .map(|c| (c[0] - half_v, c[0] + half_v, c[1] - half_a, c[1] + half_a, share(c[2])))
@@ -69,23 +75,17 @@ pub(super) fn heat(d: &Diagnosis) -> (Chart, Markup) {
     .sized(460, 230)
     .with(Layer::Cells { cells });
     let stops: Vec<String> = (0..=4)
-        .map(|k| heat_color(f64::from(k) / 4.0))
+        .map(|k| heat_color(0.08 + 0.92 * f64::from(k) / 4.0))
         .map(|c| format!("#{:02x}{:02x}{:02x}", c.0, c.1, c.2))
         .collect();
     let gradient = format!("background:linear-gradient(to right,{})", stops.join(","));
     let scale = html! {
-        figcaption { "noise" span.scale style=(gradient) {} (significant(most, 2)) " times its variance; no cell: not driven" }
+        figcaption {
+            (significant(least, 2)) span.scale style=(gradient) {} (significant(most, 2))
+            " times the variance of the noise; white: not driven"
+        }
     };
     (chart, scale)
-}
-
-/// Distance between neighbours on a grid of which some places are missing.
-fn spacing(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    let steps = values.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 1e-9);
-    let step = steps.fold(f64::INFINITY, f64::min);
-    if step.is_finite() { step } else { values.first().map_or(1.0, |v| 2.0 * v.abs().max(0.5)) }
 }
 
 /// Whether there are laps to place errors on.
@@ -137,16 +137,4 @@ pub(super) fn accelerations(d: &Diagnosis) -> Chart {
     )
     .sized(460, 230)
     .with(Layer::Cloud { role: Role::Measured, name: "driven".into(), points })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_grid_with_holes_keeps_its_step() {
-        assert_eq!(spacing([0.5, 2.5, 0.5, 1.5, 5.5].into_iter()), 1.0);
-        assert_eq!(spacing([3.0].into_iter()), 6.0);
-        assert_eq!(spacing(std::iter::empty()), 1.0);
-    }
 }

@@ -10,7 +10,7 @@ use crate::page::{facts_table, list};
 use crate::text::{interval, percent, significant, with_interval};
 
 /// Effects in the table.
-const SHOWN: usize = 8;
+const SHOWN: usize = 6;
 
 /// How the gap is made up, from the model as it came down to the noise.
 pub(super) fn budget(d: &Diagnosis) -> Markup {
@@ -44,7 +44,8 @@ pub(super) fn budget(d: &Diagnosis) -> Markup {
     html! {
         (bars(&rows))
         p {
-            "Squared rollout error over the variance of the noise, on " (g.scored_on) "; the thin line is the 90 % interval. "
+            "Mean squared error of open-loop rollouts of " (significant(g.horizon_s, 2)) " s on " (g.scored_on)
+            ", each channel over its noise (" (noise(d)) "); the thin line is the 90 % interval by block bootstrap. "
             "Flexible terms without any physics reach " (significant(ceiling.value, 3))
             " (" (interval(ceiling.low, ceiling.high)) "): less than that no effect can be expected to leave."
         }
@@ -100,7 +101,8 @@ fn size(name: &str, p: &EffectParameter) -> String {
 fn words(name: &str) -> String {
     const UNITS: [&str; 8] = ["_radps", "_rad", "_mps", "_m", "_s", "_1pm", "_per_min", "_per_g"];
     let bare = UNITS.iter().find_map(|unit| name.strip_suffix(unit)).unwrap_or(name);
-    bare.replace('_', " ")
+    // The velocities keep theirs.
+    bare.replace('_', " ").replace("v x", "v_x").replace("v y", "v_y")
 }
 
 fn unit(unit: &str) -> String {
@@ -159,7 +161,7 @@ pub(super) fn data(d: &Diagnosis, notes: &[String]) -> Markup {
 }
 
 /// The noise of each channel.
-pub(super) fn noise(d: &Diagnosis) -> String {
+fn noise(d: &Diagnosis) -> String {
     d.gap
         .channel_noise
         .iter()
@@ -175,7 +177,7 @@ mod tests {
     #[test]
     fn names_lose_underscores_and_units() {
         assert_eq!(words("steering_delay"), "steering delay");
-        assert_eq!(words("delay_s"), "delay");
+        assert_eq!((words("delay_s"), words("v_y_lever_arm")), ("delay".into(), "v_y lever arm".into()));
         assert_eq!(words("rad_per_g"), "rad");
         assert_eq!(words("yaw_rate_radps"), "yaw rate");
         assert_eq!((unit("1"), unit("m/s2")), (String::new(), " m/s²".into()));

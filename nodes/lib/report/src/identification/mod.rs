@@ -7,7 +7,7 @@ use gripsight_identification::{Method, Outcome, PerAxle, Source};
 use maud::html;
 
 use crate::page::{Tone, figure, list, page, section};
-use crate::text::{fixed, significant, with_interval};
+use crate::text::{fixed, percent, significant, with_interval};
 use crate::{Header, ReportError};
 
 /// What the page of an identification shows.
@@ -36,28 +36,37 @@ pub fn identification_page(input: &IdentificationInput<'_>) -> Result<String, Re
         pictures::WORST_S,
         significant(outcome.rmse.horizon_s, 2)
     );
+    let fitted = outcome.source != Source::Start;
+    let tires = if fitted { "Tires found" } else { "Tires that the run started from" };
+    let drawn = !outcome.trace.time_s.is_empty();
     let body = html! {
-        (section("Front tires", false, &figure(&front, "")?))
-        (section("Rear tires", false, &figure(&rear, "")?))
-        (section("Tires found", false, &tables::tires(outcome)))
-        (section("Taken out of the signals", false, &tables::signals(outcome)))
+        @if drawn {
+            (section("Front tires", false, &figure(&front, "")?))
+            (section("Rear tires", false, &figure(&rear, "")?))
+        }
+        (section(tires, false, &tables::tires(outcome)))
+        @if fitted { (section("Taken out of the signals", false, &tables::signals(outcome))) }
         (section("What limits the result", false, &list(&outcome.reasons, "Nothing that was found.")))
-        (section("Drive next", false, &list(&outcome.drive_next, "Nothing in particular: the data tell what was asked.")))
-        (section("Lateral velocity, worst seconds", false, &figure(&v_y, "")?))
-        (section("Yaw rate, worst seconds", false, &figure(&yaw_rate, &worst)?))
-        (section("Error along the drive", true, &html! {
-            div.pair {
-                @for chart in &pictures::residuals(outcome) { (figure(chart, "")?) }
-            }
-        }))
-        (section("Rollout error over horizon, held-out data", false, &figure(&pictures::horizon(outcome), "")?))
-        (section("Lateral and forward acceleration", false, &figure(&pictures::accelerations(outcome), "")?))
-        (section("Held-out errors", false, &tables::errors(outcome)))
+        (section("Drive next", false, &list(&outcome.drive_next, "Nothing in particular.")))
+        @if drawn {
+            (section("Lateral velocity, worst seconds", false, &figure(&v_y, "")?))
+            (section("Yaw rate, worst seconds", false, &figure(&yaw_rate, &worst)?))
+            (section("Error along the drive", true, &html! {
+                div.pair {
+                    @for chart in &pictures::residuals(outcome) { (figure(chart, "")?) }
+                }
+            }))
+            (section("Rollout error over horizon, held-out data", false, &figure(&pictures::horizon(outcome), "")?))
+            (section("Lateral and forward acceleration", false, &figure(&pictures::accelerations(outcome), "")?))
+        }
+        @if fitted { (section("Held-out errors", false, &tables::errors(outcome))) }
         (section("Data", false, &tables::data(outcome, input.data_notes)))
-        (section("Turns of the loop", true, &html! {
-            p { (how(outcome)) }
-            (tables::iterations(outcome))
-        }))
+        @if fitted {
+            (section("Turns of the loop", true, &html! {
+                p { (how(outcome)) }
+                (tables::iterations(outcome))
+            }))
+        }
     };
     let tone = if outcome.accepted { Tone::Good } else { Tone::Caution };
     Ok(page("Tire identification", tone, &verdict(outcome), input.header, &body))
@@ -105,7 +114,11 @@ fn how(outcome: &Outcome) -> String {
     let turns = outcome.iterations;
     let end = if outcome.converged { "converged" } else { "not converged" };
     let network = outcome.config.residual.name();
+    let nuisance = &outcome.nuisance;
     format!(
-        "Method: {method}, residual network {network}; {turns} turns, {end}. The tires above come from {source}."
+        "Method: {method}, residual network {network}; {turns} turns, {end}. The tires above come from {source}. The direct fit \
+         allowed for a relaxation length of {} m and for {} of the friction ellipse.",
+        significant(nuisance.relaxation_m, 2),
+        percent(nuisance.combined_slip)
     )
 }
