@@ -21,6 +21,17 @@ use gripsight_vehicle::VehicleParameters;
 
 const DURATION_S: f64 = 60.0;
 const MU: f64 = 0.95;
+/// Sizes below the typical ones, so that the driver can hold the car on the track.
+const SIZES: [&str; 8] = [
+    "grip_scale=-0.05",
+    "grip_balance=0.01",
+    "low_grip_patch=0.1",
+    "steering_lag=0.04",
+    "steering_delay=0.025",
+    "steering_rate_limit=0.7",
+    "yaw_inertia_error=0.8",
+    "road_slope=0.02",
+];
 
 fn main() -> anyhow::Result<()> {
     let mut car_name = "formula_student".to_owned();
@@ -36,7 +47,8 @@ fn main() -> anyhow::Result<()> {
     }
     if names.is_empty() {
         names.push("none".to_owned());
-        names.extend(EffectId::ALL.iter().map(|e| e.name().to_owned()));
+        let sized = |name: &str| SIZES.iter().find(|s| s.split('=').next() == Some(name)).copied();
+        names.extend(EffectId::ALL.iter().map(|e| sized(e.name()).unwrap_or(e.name()).to_owned()));
     }
     let car = CarParameters::by_name(&car_name)?;
     let reference = drive(&car, None, 11)?;

@@ -69,15 +69,15 @@ pub fn diagnose(request: &Request<'_>, progress: &mut dyn FnMut(&str)) -> Result
 
     progress("fitting the tires");
     let (tires, trust) = match (request.tires, request.reference) {
-        (Some(tires), _) => (tires, TireTrust::reference()),
+        (Some(tires), _) => (tires, TireTrust::file()),
         (None, Some(reference)) => {
             let reference = Recording::new(reference)?;
             let windows = split(&reference, false);
-            (fit_tires(&reference, request.vehicle, &windows.training)?, TireTrust::reference())
+            (fit_tires(&reference, request.vehicle, &windows.training)?, TireTrust::drive())
         }
         (None, None) => (fit_tires(&recording, request.vehicle, &windows.training)?, TireTrust::free()),
     };
-    let (library, invisible) = library(request, &recording, trust == TireTrust::reference())?;
+    let (library, invisible) = library(request, &recording, trust != TireTrust::free())?;
     let mut engine = Engine::new(&recording, request.vehicle, tires, trust);
     let nominal = engine.nominal_parameters();
     // The search works on a bounded number of windows, the final fit on all.
@@ -91,6 +91,8 @@ pub fn diagnose(request: &Request<'_>, progress: &mut dyn FnMut(&str)) -> Result
 
     let mut state = null.clone();
     let mut rounds: Vec<Round> = Vec::new();
+    // Whether the effect stands instead of a retune: the tires are then held where they were handed over.
+    let mut instead = false;
     while rounds.len() <= thresholds::MOST_EFFECTS {
         progress(&format!(
             "comparing {} effects, round {}",
@@ -112,16 +114,26 @@ pub fn diagnose(request: &Request<'_>, progress: &mut dyn FnMut(&str)) -> Result
         }
     }
 
+    if state.effects.is_empty() && engine.trust != TireTrust::free() {
+        progress("comparing effects with a retune of the tires");
+        if let Some((here, found)) = instead_of_retune(&engine, &null, &library, &search) {
+            rounds = vec![here];
+            state = found;
+            instead = true;
+        }
+    }
     let (null, state) = if search.windows.len() < windows.training.windows.len() {
         progress("fitting on all training blocks");
-        let on_all = |s: &State, steps| engine.fit(&s.effects, &s.parameters, None, &windows.training, steps);
-        (on_all(&null, 10), on_all(&state, 10))
+        let held = engine.holding();
+        let on_all =
+            |e: &Engine<'_>, s: &State| e.fit(&s.effects, &s.parameters, None, &windows.training, 10);
+        (on_all(&engine, &null), on_all(if instead { &held } else { &engine }, &state))
     } else {
         (null, state)
     };
     progress("scoring on held-out data");
     let budget = budget(&engine, other.as_ref(), &windows, &nominal, &null, &state, &rounds);
-    let verdict = decide(&budget, &rounds, &state);
+    let verdict = decide(&budget, &rounds, &state, instead);
     let effects = rank(&rounds, &state, &budget);
     let scored_windows =
         if windows.held_out.windows.is_empty() { &windows.training } else { &windows.held_out };
@@ -159,6 +171,29 @@ pub fn diagnose(request: &Request<'_>, progress: &mut dyn FnMut(&str)) -> Result
         data_health,
         series: pictures::series(&engine, &nominal, &null, &state, &on_all, &nominal_score, scored_windows),
     })
+}
+
+/// Where trusted tires had to move far, an effect may explain the same with the tires as they were: the round of that search, and
+/// the model found, if one does as well as the retune.
+fn instead_of_retune(
+    engine: &Engine<'_>,
+    null: &State,
+    library: &[EffectId],
+    windows: &Windows,
+) -> Option<(Round, State)> {
+    if engine.tire_shift(null) < thresholds::FAR_SHIFT {
+        return None;
+    }
+    let held = engine.holding();
+    let before = held.fit(&[], &held.nominal_parameters(), None, windows, 12);
+    let here = round(&held, &before, library, windows, 0);
+    let best = here.taken.and_then(|i| here.refits.get(i)).map(|r| r.state.clone())?;
+    // Let go again, the tires must stay nearer to what was handed over than a retune would take them.
+    let free = engine.fit(&best.effects, &best.parameters, Some(best.starts.clone()), windows, 12);
+    let cost = |s: &State| s.window_costs.iter().sum::<f64>();
+    let as_good = cost(&free) < cost(null) + thresholds::LEAST_GAIN * null.residuals();
+    let nearer = engine.tire_shift(&free) < thresholds::NEARER * engine.tire_shift(null);
+    (free.finite && as_good && nearer).then_some((here, best))
 }
 
 /// The best tires of a recording, with nothing known of them.

@@ -9,6 +9,7 @@ use crate::effects::{EffectId, ParameterSpec};
 use crate::flexible::Flexible;
 use crate::model::{BASE, ExtendedModel, HOLD, TIRES, tires_from_parameters, tires_to_parameters};
 use crate::recording::Recording;
+use crate::select::thresholds;
 use crate::windows::Windows;
 
 /// How far the tires handed over are trusted, as one standard deviation.
@@ -25,10 +26,27 @@ pub struct TireTrust {
 }
 
 impl TireTrust {
-    /// Tires from a file or a reference drive: a few percent.
+    /// Tires from a file: a few percent.
     #[must_use]
-    pub fn reference() -> Self {
+    pub fn file() -> Self {
         Self { stiffness: 0.05, peak: 0.05, shape: 0.1, curvature: 0.5 }
+    }
+
+    /// Tires from a drive of the same car that was fitted in the same way.
+    #[must_use]
+    pub fn drive() -> Self {
+        Self { stiffness: 0.02, peak: 0.02, shape: 0.05, curvature: 0.25 }
+    }
+
+    /// The same, so many times tighter.
+    #[must_use]
+    pub(crate) fn tighter(self, factor: f64) -> Self {
+        Self {
+            stiffness: self.stiffness / factor,
+            peak: self.peak / factor,
+            shape: self.shape / factor,
+            curvature: self.curvature / factor,
+        }
     }
 
     /// No tires given: only what makes the fit well posed.
@@ -136,6 +154,19 @@ impl<'a> Engine<'a> {
         let mut p = tires_to_parameters(&self.nominal).to_vec();
         p.push(0.5 * self.recording.dt_s());
         p
+    }
+
+    /// The same, with the tires held where they were handed over.
+    pub(crate) fn holding(&self) -> Self {
+        Self { trust: self.trust.tighter(thresholds::HELD_TIRES), ..self.clone() }
+    }
+
+    /// How far a state's tires lie from those handed over: sum of squares in units of the trust.
+    pub(crate) fn tire_shift(&self, state: &State) -> f64 {
+        self.parameters(&[], &state.parameters[..BASE], 1.0)
+            .iter()
+            .filter_map(|p| p.prior.map(|prior| ((p.start - prior.mean) / prior.sigma).powi(2)))
+            .sum()
     }
 
     pub(crate) fn model(&self, effects: &[EffectId], flexible: Option<&Flexible>) -> ExtendedModel<'a> {

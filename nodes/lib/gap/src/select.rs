@@ -27,6 +27,12 @@ pub(crate) mod thresholds {
     pub(crate) const LEAST_SHARE: [f64; 2] = [0.10, 0.12];
     /// How sure it must be that a candidate beats the current model, in standard deviations over blocks.
     pub(crate) const LEAST_Z: f64 = 3.0;
+    /// Sum of squares, in units of their trust, beyond which retuned tires ask for another explanation.
+    pub(crate) const FAR_SHIFT: f64 = 12.0;
+    /// How many times tighter the tires are held while one is looked for.
+    pub(crate) const HELD_TIRES: f64 = 50.0;
+    /// Share of the retune's shift that the tires may still move beside such an effect.
+    pub(crate) const NEARER: f64 = 0.4;
     /// Smallest effect that is named, over the size that matters.
     pub(crate) const LEAST_SIZE: f64 = 0.35;
     /// Candidates whose refits cannot be told apart by this many standard deviations are confused.

@@ -67,7 +67,12 @@ fn closed(from: &[(f64, f64)], to: &[(f64, f64)], retuned: &[(f64, f64)]) -> Est
 }
 
 /// The verdict, with its reasons.
-pub(crate) fn decide(budget: &Budget, rounds: &[Round], state: &State) -> (Verdict, Vec<String>) {
+pub(crate) fn decide(
+    budget: &Budget,
+    rounds: &[Round],
+    state: &State,
+    instead: bool,
+) -> (Verdict, Vec<String>) {
     let (nominal, retuned, after) = (mean(&budget.nominal), budget.retuned(), budget.after());
     let ceiling = mean(&budget.ceiling).min(after);
     let mut reasons = vec![format!(
@@ -83,6 +88,10 @@ pub(crate) fn decide(budget: &Budget, rounds: &[Round], state: &State) -> (Verdi
             reasons.push("what is left after retuning the tires is within noise and the usual imperfection of the model".to_owned());
             return (if retune { Verdict::TireRetuneOnly } else { Verdict::NoGap }, reasons);
         }
+        if nominal - retuned > LEAST_EXPLAINED * (nominal - ceiling) {
+            reasons.push("other tires explain most of what could be explained".to_owned());
+            return (Verdict::TireRetuneOnly, reasons);
+        }
         let explainable = (retuned - ceiling) / excess;
         reasons.push(format!("flexible terms would explain {:.0} % of the gap", 100.0 * explainable));
         if let Some(best) = best {
@@ -92,6 +101,15 @@ pub(crate) fn decide(budget: &Budget, rounds: &[Round], state: &State) -> (Verdi
             ));
         }
         return (Verdict::NoneOfThese, reasons);
+    }
+    if instead {
+        let explained = (nominal - after) / (nominal - ceiling).max(1e-9);
+        reasons.push(format!(
+            "with the tires as they were handed over the effect explains {:.0} % of the gap; other tires would explain as much",
+            100.0 * explained
+        ));
+        let verdict = if explained > LEAST_EXPLAINED { Verdict::Effects } else { Verdict::TireRetuneOnly };
+        return (verdict, reasons);
     }
     let possible = (retuned - ceiling).max(1e-9);
     let explained = (retuned - after) / possible;
