@@ -107,7 +107,7 @@ pub(crate) fn direct(
     let limit_mps2 = quantile(&mut lateral, 0.98).unwrap_or(0.0);
     let grip = (1.2 * limit_mps2 / GRAVITY_MPS2).clamp(0.1, 3.0);
 
-    let first = MagicFormula::from_stiffness(8.0, C_PRIOR.mean, grip, 0.0);
+    let first = MagicFormula::from_stiffness(FIRST_STIFFNESS, C_PRIOR.mean, grip, 0.0);
     let tires = warm.map_or(PacejkaParameters { front: first, rear: first }, |(tires, _)| *tires);
     let mut all: Vec<Parameter> =
         [tires.front, tires.rear].iter().flat_map(|axle| parameters(axle, prior)).collect();
@@ -177,7 +177,15 @@ const GAIN: usize = SIGNALS + 1;
 const LEVER: usize = SIGNALS + 3;
 /// Freeing gain or lever arm has to lower the error of the validation part by this share, or they stay at their nominal values: a model that is
 /// too simple would use them to mend what is not theirs.
-const WORTH: f64 = 0.05;
+const WORTH: f64 = 0.065;
+
+/// Lever arms that its fit starts from, on either side, in wheelbases.
+const LEVER_START: f64 = 0.2;
+/// Normalised stiffness that fits start from.
+const FIRST_STIFFNESS: f64 = 8.0;
+
+/// Error on the validation part, problem and fit.
+type Trial = (f64, Vec<Parameter>, Fit);
 
 struct Fitter<'a> {
     model: TireRollout<'a>,
@@ -241,16 +249,38 @@ impl Fitter<'_> {
             let p = std::array::from_fn(|j| fit.parameters[j]);
             rollout_errors(&self.model, &p, &validation, &weights.scatter).normalized
         };
-        let mut best = (error(&found), nominal.clone(), found);
-        for freed in [&[LEVER][..], &[GAIN], &[GAIN, LEVER]] {
+        let attempt = |freed: &[usize], from: &[f64]| {
             let mut trial = nominal.clone();
+            restart(&mut trial, from);
             freed.iter().for_each(|&j| trial[j].free = true);
             let fit = self.solve(&trial, &self.training, &weights.sigma, 15);
-            let e = error(&fit);
-            if e < (1.0 - WORTH) * best.0 {
-                best = (e, trial, fit);
+            // What the nominal values left over is no measure of this fit.
+            let own = self::weights(&self.model, &fit, &self.training, &self.data.noise);
+            restart(&mut trial, &fit.parameters);
+            let fit = self.solve(&trial, &self.training, &own.sigma, 15);
+            (error(&fit), trial, fit)
+        };
+        // A lever arm that was taken for stiffness may have driven it to where no step leads back: start on either side, too.
+        let wheelbase_m = self.model.vehicle.wheelbase_m();
+        let aside = |share: f64| {
+            let mut from = found.parameters.clone();
+            for axle in [0, 4] {
+                (from[axle], from[axle + 1], from[axle + 3]) = (FIRST_STIFFNESS, C_PRIOR.mean, E_PRIOR.mean);
+                from[axle + 2] = all[axle + 2].start;
             }
-        }
+            from[LEVER] = share * wheelbase_m;
+            attempt(&[LEVER], &from)
+        };
+        let levers = [attempt(&[LEVER], &found.parameters), aside(-LEVER_START), aside(LEVER_START)];
+        let better =
+            |best: Trial, next: Trial, worth: f64| if next.0 < (1.0 - worth) * best.0 { next } else { best };
+        let [first, rest @ ..] = levers;
+        let lever = rest.into_iter().fold(first, |best, next| better(best, next, 0.0));
+        let both = attempt(&[GAIN, LEVER], &lever.2.parameters);
+        let gain = attempt(&[GAIN], &found.parameters);
+        let best = [gain, lever, both]
+            .into_iter()
+            .fold((error(&found), nominal.clone(), found), |best, next| better(best, next, WORTH));
         let (_, mut all, fit) = best;
         let weights = self::weights(&self.model, &fit, &self.training, &self.data.noise);
         restart(&mut all, &fit.parameters);
