@@ -13,15 +13,22 @@
 //! It shares no model with the crates that identify and diagnose: another tire (brush), four wheels, springs, actuators
 //! and sensors as mechanisms. Frames and signs follow REP-103; everything is a function of the scenario and its seed.
 
+mod camera;
 mod car;
+mod cars;
 mod driver;
+mod effect_table;
 mod effects;
 mod error;
+mod mechanisms;
 mod motion;
 mod plant;
+mod plant_state;
 mod profile;
 mod road;
+mod samples;
 mod scenario;
+mod sensor_settings;
 mod sensors;
 mod simulation;
 mod steering;
@@ -29,15 +36,18 @@ mod tire;
 mod track;
 mod truth;
 
-pub use car::{CAR_NAMES, CarParameters, DriveParameters, GRAVITY_MPS2, PitchParameters, RollParameters};
+pub use camera::{RoadCamera, RoadPicture};
+pub use car::{CarParameters, DriveParameters, GRAVITY_MPS2, PitchParameters, RollParameters};
+pub use cars::CAR_NAMES;
 pub use driver::Command;
-pub use effects::{EFFECTS, EffectSetting, EffectSpec, Mechanisms, ParameterSpec, Patch, effect_spec};
+pub use effect_table::{EFFECTS, EffectSpec, ParameterSpec, effect_spec};
+pub use effects::EffectSetting;
 pub use error::{EndReason, ReferenceCarError};
+pub use mechanisms::{Mechanisms, Patch};
 pub use motion::{Motion, TruthSample, WheelTruth};
+pub use samples::{DriveSample, ImuSample, OdometrySample, SensorSample, WheelSample};
 pub use scenario::{Course, DriverKind, DriverSettings, Friction, MANOEUVRE_NAMES, Scenario};
-pub use sensors::{
-    DriveSample, ImuSample, Noise, OdometrySample, Sampling, SensorSample, SensorSettings, WheelSample,
-};
+pub use sensor_settings::{Noise, Sampling, SensorSettings};
 pub use simulation::{Recording, Simulation};
 pub use tire::{Contact, Tire, TireForce, TireParameters};
 pub use track::{TRACK_NAMES, Track, TrackPoint, TrackPosition};

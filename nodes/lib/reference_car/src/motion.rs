@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::plant::{Evaluation, PlantState};
+use crate::plant_state::{Evaluation, PlantState};
 use crate::track::TrackPosition;
 
 /// True motion of the true centre of gravity.

@@ -5,8 +5,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::car::CarParameters;
-use crate::effects::{Mechanisms, Patch};
-use crate::plant::Surroundings;
+use crate::mechanisms::{Mechanisms, Patch};
+use crate::plant_state::Surroundings;
 use crate::scenario::{Friction, Scenario};
 
 /// Correlation time of gusts.

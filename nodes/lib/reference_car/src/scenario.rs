@@ -3,9 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 use crate::car::CarParameters;
-use crate::effects::{EffectSetting, Mechanisms, Patch};
+use crate::effects::EffectSetting;
 use crate::error::ReferenceCarError;
-use crate::sensors::SensorSettings;
+use crate::mechanisms::{Mechanisms, Patch};
+use crate::sensor_settings::SensorSettings;
 use crate::track::TRACK_NAMES;
 
 /// Where and how the car is driven.

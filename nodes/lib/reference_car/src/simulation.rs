@@ -2,13 +2,15 @@
 
 use crate::car::GRAVITY_MPS2;
 use crate::driver::{Command, Driver, View};
-use crate::effects::Mechanisms;
 use crate::error::{EndReason, ReferenceCarError};
+use crate::mechanisms::Mechanisms;
 use crate::motion::{Motion, TruthSample};
-use crate::plant::{Actuation, Evaluation, Plant, PlantState, Surroundings};
+use crate::plant::Plant;
+use crate::plant_state::{Actuation, Evaluation, PlantState, Surroundings};
 use crate::road::Road;
+use crate::samples::{DriveSample, SensorSample};
 use crate::scenario::{Course, Scenario};
-use crate::sensors::{DriveSample, SensorSample, Sensors};
+use crate::sensors::Sensors;
 use crate::steering::Steering;
 use crate::track::{Track, TrackPosition};
 

@@ -8,7 +8,7 @@
 
 use std::collections::VecDeque;
 
-use crate::effects::SteeringMechanisms;
+use crate::mechanisms::SteeringMechanisms;
 
 /// Damping ratio of the servo.
 const DAMPING: f64 = 0.8;
