@@ -16,8 +16,10 @@ pub(crate) struct Counts {
 
 /// What the state is judged by.
 pub(crate) struct Facts<'a> {
-    /// Why there is no network.
+    /// Why there is no network, where one was wanted.
     pub(crate) no_network: Option<&'a str>,
+    /// Whether the configured friction stands.
+    pub(crate) configured: bool,
     pub(crate) counts: Counts,
     /// Pictures read since the last look.
     pub(crate) newly_read: u64,
@@ -34,6 +36,8 @@ pub(crate) fn status(facts: &Facts<'_>) -> Status {
     let refused = facts.last.and_then(|e| e.reason.map(|reason| (reason, e.detail.as_deref())));
     let (level, text) = if let Some(why) = facts.no_network {
         (Level::Error, format!("the configured friction stands, there is no network: {why}"))
+    } else if facts.configured {
+        (Level::Ok, "the configured friction stands, as asked for".to_owned())
     } else if facts.newly_read == 0 {
         (Level::Error, "no picture arrives".to_owned())
     } else if let Some((reason, detail)) = refused {
@@ -87,6 +91,7 @@ mod tests {
             (estimate(None), estimate(Some(Reason::Dark)), estimate(Some(Reason::NetworkFailed)));
         let facts = |last| Facts {
             no_network: None,
+            configured: false,
             counts: Counts::default(),
             newly_read: 30,
             last: Some(last),
@@ -99,6 +104,7 @@ mod tests {
         assert_eq!(status(&facts(&failed)).level, Level::Error);
         let warned = status(&facts(&dark));
         assert_eq!((warned.level, warned.message.contains("dark")), (Level::Warn, true));
+        assert_eq!(status(&Facts { newly_read: 0, configured: true, ..facts(&good) }).level, Level::Ok);
         let missing = status(&Facts { no_network: Some("no library"), ..facts(&good) });
         assert_eq!((missing.level, missing.message.contains("no library")), (Level::Error, true));
     }

@@ -11,7 +11,7 @@ use gripsight_msgs::FrictionPrior;
 use gripsight_msgs::standard::nav_msgs::Odometry;
 use gripsight_msgs::standard::sensor_msgs::{CompressedImage, Image};
 use gripsight_msgs::standard::std_msgs::Header;
-use gripsight_runtime::{Clock, Descriptor, Diagnostics, Node, Publisher, Qos, Subscription};
+use gripsight_runtime::{Clock, Diagnostics, Node, Publisher, Qos, Subscription};
 
 use crate::diagnostics::{Counts, Facts, status};
 use crate::settings;
@@ -23,19 +23,14 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
     if let Some(why) = &no_network {
         tracing::error!("the configured friction stands, there is no network: {why}");
     }
-    let estimator =
-        FrictionEstimator::new(configuration.settings, configuration.basis, configuration.network.ok());
-    let input = node.parameter(
-        "input",
-        String::from("both"),
-        Descriptor::new("Which picture topics to subscribe to")
-            .choices(&["both", "raw", "compressed"])
-            .read_only(),
-    )?;
-    let wanted = input.get();
+    let wanted = configuration.input;
+    let network = configuration.network.ok().flatten();
+    let configured = network.is_none();
+    let estimator = FrictionEstimator::new(configuration.settings, configuration.basis, network);
     let pictures = node.sensor_qos(2).with_depth(2);
-    let raw = (wanted != "compressed").then(|| node.subscription::<Image>("image", pictures)).transpose()?;
-    let compressed = (wanted != "raw")
+    let wants = |kind: &str| wanted == "both" || wanted == kind;
+    let raw = wants("raw").then(|| node.subscription::<Image>("image", pictures)).transpose()?;
+    let compressed = wants("compressed")
         .then(|| node.subscription::<CompressedImage>("image/compressed", pictures))
         .transpose()?;
     let odometry = node.subscription::<Odometry>("odom", node.sensor_qos(50))?;
@@ -43,6 +38,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
     let state = State {
         estimator,
         no_network,
+        configured,
         odometer: Odometer::default(),
         counts: Counts::default(),
         seen: Counts::default(),
@@ -115,6 +111,8 @@ fn newest<M>(subscription: &mut Option<Subscription<M>>, first: M, counts: &mut 
 struct State {
     estimator: FrictionEstimator,
     no_network: Option<String>,
+    /// There is no network: the configured friction stands.
+    configured: bool,
     odometer: Odometer,
     counts: Counts,
     /// The counts when the state was last reported.
@@ -152,13 +150,14 @@ impl State {
     /// Once a second: says how the node is, and publishes where no picture did.
     async fn tick(&mut self) {
         let newly_read = self.counts.read - self.seen.read;
-        if newly_read == 0 || self.no_network.is_some() {
+        if newly_read == 0 || self.configured {
             let estimate = self.estimator.without_picture();
             self.friction.publish(&self.message(&estimate)).await;
             self.last = Some(estimate);
         }
         let facts = Facts {
             no_network: self.no_network.as_deref(),
+            configured: self.configured,
             counts: self.counts,
             newly_read,
             last: self.last.as_ref(),

@@ -12,8 +12,10 @@ use gripsight_runtime::{Descriptor, Node};
 pub(crate) struct Configuration {
     pub(crate) settings: Settings,
     pub(crate) basis: Basis,
-    /// The network, or why there is none.
-    pub(crate) network: Result<Box<dyn Network>, FrictionError>,
+    /// The network, or why there is none; none is wanted without an input.
+    pub(crate) network: Result<Option<Box<dyn Network>>, FrictionError>,
+    /// Picture topics to subscribe to: `both`, `raw`, `compressed` or `none`.
+    pub(crate) input: String,
     pub(crate) publish_region: bool,
 }
 
@@ -155,9 +157,17 @@ pub(crate) fn declare(node: &mut Node) -> anyhow::Result<Configuration> {
     let publish_region =
         Descriptor::new("Publish what the network sees on ~/region/compressed, once a second").read_only();
     let publish_region = node.parameter("publish_region", false, publish_region)?.get();
+    let input =
+        Descriptor::new("Which picture topics to subscribe to; none publishes the configured friction");
+    let input = input.choices(&["both", "raw", "compressed", "none"]).read_only();
+    let input = node.parameter("input", String::from("both"), input)?.get();
     let program = std::env::current_exe()?;
-    let network = network(library.as_deref(), model.as_deref(), program.parent().unwrap_or(Path::new(".")));
-    Ok(Configuration { settings, basis, network, publish_region })
+    let beside = program.parent().unwrap_or(Path::new("."));
+    let network = match input.as_str() {
+        "none" => Ok(None),
+        _ => network(library.as_deref(), model.as_deref(), beside).map(Some),
+    };
+    Ok(Configuration { settings, basis, network, input, publish_region })
 }
 
 fn network(

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from PIL import Image
 from torch.utils.data import Dataset
 
 import degradations
@@ -22,12 +23,24 @@ def to_tensor(picture):
     return torch.from_numpy(((picture * np.float32(1 / 255) - MEAN) / STD).transpose(2, 0, 1).copy())
 
 
+def plain(rng, photo, size):
+    """A photograph as it is, for the class dry: most of it, resized as the node does, mirrored, a little brighter or darker."""
+    h, w = photo.shape[:2]
+    ch, cw = int(h * rng.uniform(0.7, 1.0)), int(w * rng.uniform(0.7, 1.0))
+    y, x = rng.integers(h - ch + 1), rng.integers(w - cw + 1)
+    cut = Image.fromarray(photo[y:y + ch, x:x + cw]).resize((size, size), Image.BILINEAR)
+    out = np.asarray(cut, np.float32) * np.exp(rng.normal(0, 0.12)) * np.exp(rng.normal(0, 0.03, 3))
+    out = np.clip(out, 0, 255).astype(np.uint8)
+    return out[:, ::-1] if rng.random() < 0.5 else out
+
+
 class Renders(Dataset):
     """Picture `i` of a split, made from (seed, i) alone. Items: (tensor, target (5,), kind) with kind 1 for outliers."""
 
-    def __init__(self, root, split, size, count, seed, outliers=True, procedural_share=PROCEDURAL_SHARE, first=0):
+    def __init__(self, root, split, size, count, seed, outliers=True, procedural_share=PROCEDURAL_SHARE, first=0,
+                 plain_share=0.0):
         self.size, self.count, self.seed, self.first = size, count, seed, first
-        self.outliers, self.procedural_share = outliers, procedural_share
+        self.outliers, self.procedural_share, self.plain_share = outliers, procedural_share, plain_share
         self.photographs = load_photographs(root, split, (*ROADS, *OUTLIERS))
         self.bank = Bank(BANK_SEEDS[split])
         self.folders, self.shares = list(ROADS), np.array(list(ROADS.values()))
@@ -41,6 +54,8 @@ class Renders(Dataset):
         made = rng.random() < self.procedural_share
         folder = "procedural" if made else self.folders[rng.choice(len(self.folders), p=self.shares)]
         photo = None if made else self.photographs[folder][rng.integers(len(self.photographs[folder]))]
+        if photo is not None and self.plain_share and rng.random() < self.plain_share:
+            return plain(rng, photo, self.size), np.eye(5, dtype=np.float32)[0], 0, folder
         road, f = render(rng, self.bank, self.size, photo)
         if self.outliers and rng.random() < OUTLIER_SHARE:
             families = list(degradations.SEEN)
@@ -100,8 +115,6 @@ class Rscd(Dataset):
         return len(self.files)
 
     def __getitem__(self, i):
-        from PIL import Image
-
         path, label = self.files[i]
         picture = np.asarray(self.transform(Image.open(path).convert("RGB")))
         return to_tensor(picture), torch.nn.functional.one_hot(torch.tensor(label), len(CLASSES)).float(), 0

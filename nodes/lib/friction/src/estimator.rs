@@ -167,7 +167,7 @@ pub struct ModelLimits {
 
 impl Default for ModelLimits {
     fn default() -> Self {
-        Self { most_entropy: 0.85, most_energy: 0.0 }
+        Self { most_entropy: 0.85, most_energy: -1.7 }
     }
 }
 

@@ -113,7 +113,7 @@ impl Default for QualityLimits {
             least_mean: 20.0,
             most_dark: 0.5,
             most_saturated: 0.6,
-            most_noise: 35.0,
+            most_noise: 20.0,
             least_structure: 0.25,
         }
     }
