@@ -1,5 +1,8 @@
 //! The contract that scripts depend on: help, exit codes, files, errors.
 
+// Helpers outside of #[test] functions panic like tests do.
+#![allow(clippy::unwrap_used)]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

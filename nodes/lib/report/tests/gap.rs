@@ -1,5 +1,8 @@
 //! The gap page on a made-up diagnosis.
 
+// Helpers outside of #[test] functions panic like tests do.
+#![allow(clippy::unwrap_used)]
+
 use std::collections::BTreeMap;
 
 use gripsight_gap::{

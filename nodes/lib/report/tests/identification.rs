@@ -1,5 +1,8 @@
 //! The identification page on a made-up outcome.
 
+// Helpers outside of #[test] functions panic like tests do.
+#![allow(clippy::unwrap_used)]
+
 use std::f64::consts::TAU;
 
 use gripsight_identification::{

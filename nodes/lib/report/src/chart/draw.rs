@@ -205,7 +205,7 @@ fn strip(context: &mut Context<'_, '_>, frame: &Frame, bins: &[(f64, f64, f64)])
 /// Slanted lines over a range of x, over the whole height.
 fn hatch(context: &mut Context<'_, '_>, frame: &Frame, from: f64, to: f64) -> Outcome {
     let (from, to) = (frame.clamp_x(from), frame.clamp_x(to));
-    if !(from < to) {
+    if from.is_nan() || to.is_nan() || from >= to {
         return Ok(());
     }
     let area = context.plotting_area();
