@@ -7,7 +7,7 @@ use crate::{Identification, Outcome, PeakFriction};
 const NO_WORSE: f64 = 1.02;
 
 /// Largest scatter of v_y, as a share of the rear slips visited, that tires can be fitted through.
-const V_Y_SHARE: f64 = 0.35;
+const V_Y_SHARE: f64 = 0.2;
 
 /// Fills in verdict, reasons and advice.
 pub(crate) fn judge(run: &Identification, outcome: &mut Outcome) {

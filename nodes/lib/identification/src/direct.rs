@@ -246,6 +246,10 @@ impl Fitter<'_> {
             found = self.solve(&nominal, &self.training, &weights.sigma, 15);
         }
         let error = |fit: &Fit| -> f64 {
+            // A stiffness on its bound is none.
+            if fit.on_bound.iter().any(|j| [0, 4].contains(j)) {
+                return f64::MAX;
+            }
             let p = std::array::from_fn(|j| fit.parameters[j]);
             rollout_errors(&self.model, &p, &validation, &weights.scatter).normalized
         };

@@ -162,7 +162,7 @@ fn descend<M: Rollout>(
                 .iter()
                 .zip(&here.eliminations)
                 .map(|(x, e)| {
-                    let dx = &e.offset + &e.slope * &taken;
+                    let dx = e.offset + &e.slope * &taken;
                     [x[0] - dx[0], x[1] - dx[1]]
                 })
                 .collect();

@@ -1,5 +1,7 @@
 //! Recorded cars: what can be said of them, and what cannot.
 
+#![allow(clippy::unwrap_used)]
+
 use gripsight_identification::{Config, FrictionPrior, Outcome, ResidualKind, identify};
 use gripsight_signals::StateSequence;
 use gripsight_vehicle::VehicleParameters;

@@ -4,7 +4,7 @@ use gripsight_identification::{
     Config, FrictionPrior, Identification, IdentificationError, Method, Monitor, Next, PerAxle, ResidualKind,
     Started, identify, train_residual,
 };
-use gripsight_reference_car::{EffectSetting, Friction, Recording};
+use gripsight_reference_car::{EffectSetting, Recording};
 use gripsight_signals::StateSequence;
 use gripsight_vehicle::{MagicFormula, PacejkaParameters, VehicleParameters};
 
@@ -183,20 +183,20 @@ fn broken_telemetry_is_an_error() {
 
 #[test]
 fn the_monitor_notices_a_loss_of_grip_and_nothing_else() {
-    let (_, sequence, vehicle) = drive(scenario("f1tenth", "club", 0.9, 0.9, 11));
+    let at = |mu: f64, seed: u64| with_background(scenario("race_car", "clover", mu, 1.0, seed));
+    let (_, sequence, vehicle) = drive(at(0.7, 23));
     let outcome = identify(&sequence, &vehicle, None, None, &quick(), &mut |_| {}).unwrap();
     let set = outcome.accepted_set().unwrap_or_else(|| panic!("{:?}", outcome.reasons));
     let monitor = Monitor::new(&vehicle, &set).unwrap();
-    let (_, same, _) = drive(scenario("f1tenth", "club", 0.9, 0.9, 13).duration(10.0));
+    let (_, same, _) = drive(at(0.7, 25).duration(15.0));
     let quiet = monitor.look(&same).unwrap();
     assert!(!quiet.changed, "{quiet:?}");
-    let wet = Friction::Uniform { mu: 0.65 };
-    let (_, slippery, _) = drive(scenario("f1tenth", "club", 0.9, 0.62, 13).friction(wet).duration(10.0));
+    let (_, slippery, _) = drive(at(0.5, 25).duration(15.0));
     let notice = monitor.look(&slippery).unwrap();
     assert!(notice.changed, "{notice:?}");
     assert!(notice.peak_factor.front.value < 0.9 * set.phi_p.front.d, "{notice:?}");
     // Warm-started, the next run follows.
-    let (_, longer, _) = drive(scenario("f1tenth", "club", 0.65, 0.9, 15));
+    let (_, longer, _) = drive(at(0.5, 27));
     let next = identify(&longer, &vehicle, None, Some(&set), &quick(), &mut |_| {}).unwrap();
     assert!(next.phi_p.front.d < 0.85 * set.phi_p.front.d, "{:?}", next.phi_p);
 }

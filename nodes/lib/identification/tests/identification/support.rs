@@ -1,5 +1,7 @@
 //! Telemetry of the reference car, and of recorded cars where they are at hand.
 
+#![allow(clippy::unwrap_used)]
+
 use std::path::PathBuf;
 
 use gripsight_reference_car::{
