@@ -246,8 +246,8 @@ fn informative(recording: &Recording) -> Result<(), GapError> {
     const LEAST_STEERING_RAD: f64 = 2e-3;
     const LEAST_A_Y_MPS2: f64 = 0.4;
     let rms = |values: &mut dyn Iterator<Item = f64>| {
-        let (n, s) = values.fold((0.0, 0.0), |(n, s), v| (n + 1.0, s + v * v));
-        if n > 0.0 { (s / n as f64).sqrt() } else { 0.0 }
+        let (n, s) = values.fold((0.0_f64, 0.0_f64), |(n, s), v| (n + 1.0, s + v * v));
+        if n > 0.0 { f64::sqrt(s / n) } else { 0.0 }
     };
     let steering = rms(&mut recording.runs.iter().flat_map(|r| r.steering_rad.iter().copied()));
     let a_y = rms(&mut recording

@@ -129,9 +129,7 @@ impl<T: Real> Mover<'_, '_, T> {
         }
         memory = rates.memory;
         let behind = self.slip_behind();
-        for i in 0..2 {
-            memory.slip_rad[i] = memory.steady_rad[i] + behind[i];
-        }
+        memory.slip_rad = [memory.steady_rad[0] + behind[0], memory.steady_rad[1] + behind[1]];
         self.rates_of(&self.car, x, &now, &memory, 0.0)
     }
 

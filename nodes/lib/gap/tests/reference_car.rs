@@ -1,5 +1,7 @@
 //! The diagnosis on the reference car, which shares no model with it.
 
+#![allow(clippy::unwrap_used)]
+
 mod common;
 
 use common::{drive, nominal};
