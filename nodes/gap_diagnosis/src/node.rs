@@ -42,7 +42,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
         Vec::<String>::new(),
         Descriptor::new("Effects to leave out of the library, by name"),
     )?;
-    let sequences = node.subscription::<SequenceMessage>("sequence", Qos::latched().with_depth(16))?;
+    let sequences = node.subscription::<SequenceMessage>("sequence", Qos::latched().with_depth(64))?;
     let tires = node.subscription::<PacejkaParams>("pacejka", Qos::latched())?;
     let output = node.publisher::<GapReport>("~/report", Qos::latched())?;
     let diagnostics = node.diagnostics();

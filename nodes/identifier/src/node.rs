@@ -24,7 +24,7 @@ use crate::run::{Run, RunError};
 pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyhow::Result<()>> + use<>> {
     let vehicle = Arc::new(vehicle_parameters(node)?);
     let settings = Settings::declare(node)?;
-    let sequences = node.subscription::<SequenceMessage>("sequence", Qos::latched().with_depth(16))?;
+    let sequences = node.subscription::<SequenceMessage>("sequence", Qos::latched().with_depth(64))?;
     let frictions = node.subscription::<FrictionMessage>("friction", Qos::latched())?;
     let models = node.subscription::<ModelMessage>("model", Qos::latched())?;
     let outputs = Outputs::new(node)?;

@@ -44,7 +44,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
         residual: ResidualKind::from_name(&residual.get()).unwrap_or_default(),
         ..Config::default()
     };
-    let mut sequences = node.subscription::<SequenceMessage>("sequence", Qos::latched().with_depth(16))?;
+    let mut sequences = node.subscription::<SequenceMessage>("sequence", Qos::latched().with_depth(64))?;
     let mut candidates = node.subscription::<PacejkaParams>("candidate", Qos::latched())?;
     let mut learner = Learner {
         hash: vehicle_hash(&vehicle),

@@ -14,8 +14,10 @@ use gripsight_signals::{Excitation, Measurement, StateSequence, WindowConfig};
 use crate::buffer::{Buffer, Counts};
 use crate::diagnostics::{Facts, status};
 
-/// Messages of sequences that a late joiner still gets: the parts of a few.
-const SEQUENCE_DEPTH: usize = 16;
+/// Chunks that a late joiner still gets: those of the last few sequences.
+const SEQUENCE_DEPTH: usize = 64;
+/// Pause between chunks: RustDDS sends without pacing, and a reader's socket buffer holds only a few.
+const CHUNK_PAUSE: Duration = Duration::from_millis(10);
 
 /// Declares parameters and topics; gives the node's work.
 pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyhow::Result<()>> + use<>> {
@@ -118,6 +120,7 @@ impl Outputs {
         };
         for message in sequence_to_messages(sequence, &handshake, &state.frame_id) {
             self.sequence.publish(&message).await;
+            tokio::time::sleep(CHUNK_PAUSE).await;
         }
         let excitation = match Excitation::of(sequence) {
             Ok(excitation) => excitation,

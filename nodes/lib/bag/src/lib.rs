@@ -35,7 +35,7 @@ pub use info::{BagInfo, TopicInfo, Usable, info};
 pub use inject::inject;
 pub use recover::{Recovered, recover};
 pub use sequence::{
-    MESSAGE_LIMIT_BYTES, Reassembler, RecordedSequence, read_recorded_sequences, sequence_to_messages,
+    CHUNK_LIMIT_BYTES, Reassembler, RecordedSequence, read_recorded_sequences, sequence_to_messages,
 };
 pub use telemetry::{ReadReport, read_measurements, read_sequences};
 pub use topics::{Role, Streams, TopicMap};

@@ -1,4 +1,4 @@
-//! `StateSequence`: the domain's and the message's, in chunks that stay under [`MESSAGE_LIMIT_BYTES`].
+//! `StateSequence`: the domain's and the message's, in chunks that stay under [`CHUNK_LIMIT_BYTES`].
 //!
 //! All channels are float32 on both sides and pass bit for bit.
 
@@ -10,8 +10,9 @@ use gripsight_signals::StateSequence;
 
 use crate::{Bag, BagError, decode, encode, from_cdr};
 
-/// No message of the suite is longer: what default receive buffers take without loss.
-pub const MESSAGE_LIMIT_BYTES: usize = 150_000;
+/// No chunk is longer: under 64 KB a message is one datagram on the loopback. Two of 150 KB in a row, each within a default receive
+/// buffer (208 KiB) of its own, overran that of a CycloneDDS reader, and the second never arrived.
+pub const CHUNK_LIMIT_BYTES: usize = 60_000;
 /// Sequences that a [`Reassembler`] holds open or remembers as done.
 const KEPT: usize = 16;
 const CHANNELS: usize = 19;
@@ -32,7 +33,7 @@ pub fn sequence_to_messages(sequence: &StateSequence, handshake: &Handshake, fra
     let channels = channels(sequence);
     let recorded = channels.iter().filter(|c| !c.is_empty()).count();
     let texts = frame_id.len() + handshake.run_id.len() + handshake.vehicle_hash.len();
-    let room = MESSAGE_LIMIT_BYTES.saturating_sub(texts + 512);
+    let room = CHUNK_LIMIT_BYTES.saturating_sub(texts + 512);
     let per_chunk = (room / (size_of::<f32>() * recorded.max(1))).max(1);
     let chunks = sequence.len().div_ceil(per_chunk).max(1);
     let header = Header { stamp: encode::time(sequence.start_stamp_ns), frame_id: frame_id.to_owned() };

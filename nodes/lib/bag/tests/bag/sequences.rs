@@ -1,7 +1,7 @@
 //! State sequences over messages, in chunks, and out of bags.
 
 use gripsight_bag::{
-    BagError, BagWriter, MESSAGE_LIMIT_BYTES, Reassembler, TopicMap, read_recorded_sequences, read_sequences,
+    BagError, BagWriter, CHUNK_LIMIT_BYTES, Reassembler, TopicMap, read_recorded_sequences, read_sequences,
     sequence_to_messages, to_cdr,
 };
 use gripsight_msgs::Handshake;
@@ -43,10 +43,10 @@ fn handshake() -> Handshake {
 
 #[test]
 fn no_message_is_over_the_limit_and_chunks_are_few() {
-    for (recorded, len, chunks) in [(true, 3000, 2), (false, 3000, 1), (true, 60_000, 31), (false, 2, 1)] {
+    for (recorded, len, chunks) in [(true, 3000, 4), (false, 3000, 2), (true, 60_000, 77), (false, 2, 1)] {
         let messages = sequence_to_messages(&sequence(len, recorded), &handshake(), "map");
         let longest = messages.iter().map(|m| to_cdr(m).unwrap().len()).max().unwrap();
-        assert!(longest <= MESSAGE_LIMIT_BYTES, "{longest}");
+        assert!(longest <= CHUNK_LIMIT_BYTES, "{longest}");
         assert_eq!(messages.len(), chunks);
     }
 }

@@ -1,0 +1,204 @@
+//! The whole suite on topics: a bag or a peer's messages in, Phi_p out to real peers, and the same Phi_p as offline.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+use gripsight_bag::{BagWriter, Reassembler};
+use gripsight_msgs::standard::ackermann_msgs::AckermannDriveStamped;
+use gripsight_msgs::standard::nav_msgs::Odometry;
+use gripsight_msgs::{MagicFormula, Message, PacejkaParams, StateSequence};
+use gripsight_tests::domain::Domain;
+use gripsight_tests::peers::{PATIENCE, available, cyclone, fast_dds, message, start_built, start_cyclone};
+use gripsight_tests::process::{Process, node, program};
+use serde_json::{Value, json};
+
+/// A run on one busy core.
+const RUN: Duration = Duration::from_secs(90);
+const PRIOR: (f64, f64) = (0.9, 0.2);
+
+/// A drive of the reference car: bag and vehicle file.
+fn drive(folder: &Path) -> (PathBuf, PathBuf) {
+    let bag = folder.join("drive.mcap");
+    let arguments = ["simulate", "--duration", "32", "--seed", "11", "--pace", "0.9", "--out"];
+    let output = Command::new(program("gripsight")).args(arguments).arg(&bag).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    (bag, folder.join("drive.vehicle.yaml"))
+}
+
+/// telemetry, s4_residual and identifier, joined as the launchers join them.
+fn suite(domain: &Domain, vehicle: &Path) -> [Process; 3] {
+    let vehicle = vehicle.to_str().unwrap();
+    let start = |name: &str, arguments: &[&str]| {
+        node(domain, name, &[arguments, &["--params-file", vehicle]].concat())
+    };
+    let window = ["-p", "window_s:=30.0", "-p", "hop_s:=30.0", "-p", "reliable_inputs:=true"];
+    let topics = ["-r", "odom:=/car_state/odom", "-r", "imu:=/imu/data", "-r", "wheels:=/wheel_speeds"];
+    [
+        start("telemetry", &[&window[..], &topics[..]].concat()),
+        start(
+            "s4_residual",
+            &["-r", "sequence:=telemetry/sequence", "-r", "candidate:=identifier/candidate"],
+        ),
+        start(
+            "identifier",
+            &[
+                "-r",
+                "sequence:=telemetry/sequence",
+                "-r",
+                "model:=s4_residual/model",
+                "-r",
+                "friction:=camera_prior/friction",
+            ],
+        ),
+    ]
+}
+
+/// A peer tells the identifier the road's friction.
+fn tell_prior(domain: &Domain, python: &Path) {
+    let topic = ["publish", "/camera_prior/friction", "gripsight_msgs/msg/FrictionPrior", "--qos", "latched"];
+    let mut peer = start_cyclone(domain, python, &topic);
+    peer.feed(&json!({"source": 1, "valid": true, "mu": PRIOR.0, "sigma": PRIOR.1}).to_string());
+    assert!(peer.wait(PATIENCE).success());
+}
+
+/// A peer that prints what it hears; `latched` keeps the last message only, `reliable` every one.
+fn listen(domain: &Domain, python: &Path, topic: &str, kind: &str, qos: &str, count: &str) -> Process {
+    let timeout = RUN.as_secs().to_string();
+    start_cyclone(
+        domain,
+        python,
+        &["subscribe", topic, kind, "--qos", qos, "--count", count, "--timeout", &timeout],
+    )
+}
+
+/// The parts of the first sequence, as a peer received them.
+fn parts(peer: &Process) -> Vec<StateSequence> {
+    let mut parts: Vec<StateSequence> = vec![serde_json::from_str(&peer.line(RUN)).unwrap()];
+    while parts.len() < parts[0].chunks as usize {
+        parts.push(message(peer));
+    }
+    parts
+}
+
+fn accepted(peer: &Process) -> PacejkaParams {
+    let set: PacejkaParams = serde_json::from_str(&peer.line(RUN)).unwrap();
+    assert_eq!(set.status, PacejkaParams::ACCEPTED);
+    set
+}
+
+/// What `gripsight identify` gives on recorded sequences.
+fn offline(folder: &Path, parts: &[StateSequence], vehicle: &Path) -> Value {
+    let bag = folder.join("recorded.mcap");
+    let mut writer = BagWriter::create(&bag).unwrap();
+    for part in parts {
+        writer.write("/telemetry/sequence", 0, part).unwrap();
+    }
+    writer.finish().unwrap();
+    let out = folder.join("out");
+    let output = Command::new(program("gripsight"))
+        .arg("identify")
+        .arg(&bag)
+        .args(["--prior-mu", &PRIOR.0.to_string(), "--prior-sigma", &PRIOR.1.to_string(), "--vehicle"])
+        .arg(vehicle)
+        .arg("--out")
+        .arg(&out)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_str(&std::fs::read_to_string(out.join("identification.json")).unwrap()).unwrap()
+}
+
+fn numbers(axle: &MagicFormula) -> Value {
+    json!({"b": axle.b, "c": axle.c, "d": axle.d, "e": axle.e})
+}
+
+#[test]
+fn the_live_phi_p_is_the_offline_one_bit_for_bit_at_1x_and_at_10x() {
+    let (Ok(python), Ok(fast)) = (cyclone(), fast_dds()) else {
+        available(&[cyclone(), fast_dds()]);
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let (bag, vehicle) = drive(folder.path());
+    for rate in ["1.0", "10.0"] {
+        let domain = Domain::new();
+        let sequences =
+            listen(&domain, &python, "/telemetry/sequence", StateSequence::TYPE, "reliable", "1000");
+        let tires = listen(&domain, &python, "/identifier/pacejka", PacejkaParams::TYPE, "latched", "1");
+        let _suite = suite(&domain, &vehicle);
+        tell_prior(&domain, &python);
+        let path = format!("bag:={}", bag.display());
+        let speed = format!("rate:={rate}");
+        let wait = "wait_for:=[/car_state/odom, /drive, /imu/data, /wheel_speeds]";
+        let _player = node(&domain, "bag_player", &["-p", &path, "-p", &speed, "-p", wait]);
+
+        let parts = parts(&sequences);
+        let live = accepted(&tires);
+        let (joined, samples) = (joined(&parts), parts.iter().map(|p| p.time_s.len()).sum::<usize>());
+        assert_eq!((joined.sequence_id, joined.len()), (live.handshake.sequence_id, samples));
+        let offline = offline(folder.path(), &parts, &vehicle);
+        assert_eq!(offline["phi_p"]["front"], numbers(&live.front), "at {rate}x");
+        assert_eq!(offline["phi_p"]["rear"], numbers(&live.rear), "at {rate}x");
+
+        // Late joiners, of both makes, get the set that the MPC has.
+        let late = listen(&domain, &python, "/identifier/pacejka", PacejkaParams::TYPE, "latched", "1");
+        assert_eq!(accepted(&late), live);
+        let late = start_built(&domain, &fast, "/identifier/pacejka", 1);
+        assert_eq!(message::<PacejkaParams>(&late), live);
+    }
+}
+
+fn joined(parts: &[StateSequence]) -> gripsight_signals::StateSequence {
+    let mut reassembler = Reassembler::default();
+    parts.iter().find_map(|p| reassembler.push(p.clone()).unwrap()).unwrap().sequence
+}
+
+#[test]
+fn a_peer_s_odometry_and_drive_messages_are_identified_from() {
+    let Ok(python) = cyclone() else {
+        available(&[cyclone()]);
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let (bag, vehicle) = drive(folder.path());
+    let domain = Domain::new();
+    let tires = listen(&domain, &python, "/identifier/pacejka", PacejkaParams::TYPE, "latched", "1");
+    let _suite = suite(&domain, &vehicle);
+    tell_prior(&domain, &python);
+    // The drive commands first: odometry that comes before its command would have to do without.
+    let kinds = [
+        ("/drive", "ackermann_msgs/msg/AckermannDriveStamped"),
+        ("/car_state/odom", "nav_msgs/msg/Odometry"),
+    ];
+    let lines = lines(&bag, kinds.map(|(topic, _)| topic));
+    for ((topic, kind), lines) in kinds.into_iter().zip(lines) {
+        let mut peer = start_cyclone(&domain, &python, &["publish", topic, kind, "--timeout", "60"]);
+        peer.feed(&lines);
+        assert!(peer.wait(RUN).success());
+    }
+    assert!(accepted(&tires).front.d > 0.0);
+}
+
+/// The messages of two topics of a bag as JSON lines, drive commands and odometry.
+fn lines(bag: &Path, topics: [&str; 2]) -> [String; 2] {
+    let mut lines = [String::new(), String::new()];
+    for message in gripsight_bag::Bag::open(bag).unwrap().messages() {
+        let message = message.unwrap();
+        let Some(place) = topics.iter().position(|&topic| topic == message.channel.topic) else { continue };
+        let json = if place == 0 {
+            serde_json::to_value(gripsight_bag::from_cdr::<AckermannDriveStamped>(&message.data).unwrap())
+                .unwrap()
+        } else {
+            let mut json =
+                serde_json::to_value(gripsight_bag::from_cdr::<Odometry>(&message.data).unwrap()).unwrap();
+            // Zero throughout, which is what the peer sends where nothing is given.
+            json["pose"]["covariance"].take();
+            json["twist"]["covariance"].take();
+            json
+        };
+        lines[place].push_str(&json.to_string());
+        lines[place].push('\n');
+    }
+    lines
+}
