@@ -80,7 +80,8 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     let reference = args.bag2.as_ref().map(|_| read(&args.bag, &topics)).transpose()?;
     let held_out = args.heldout.as_deref().map(|path| read(path, &topics)).transpose()?;
     let reading_s = start.elapsed().as_secs_f64();
-    let spinner = ProgressBar::new_spinner().with_style(ProgressStyle::with_template("{spinner} {msg} {elapsed}")?);
+    let spinner =
+        ProgressBar::new_spinner().with_style(ProgressStyle::with_template("{spinner} {msg} {elapsed}")?);
     let request = Request {
         sequence: &sequence,
         held_out: held_out.as_ref().map(|h| &h.0),
