@@ -1,5 +1,7 @@
 //! `gripsight bag` as a user runs it.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests, not only test functions, may fail")]
+
 use std::path::Path;
 use std::process::{Command, Output};
 

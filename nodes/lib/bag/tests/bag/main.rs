@@ -1,5 +1,11 @@
 //! Tests of `gripsight_bag` from outside.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "helpers of tests, not only test functions, may fail"
+)]
+
 mod errors;
 mod hostile;
 mod inject;
