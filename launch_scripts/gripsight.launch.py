@@ -52,13 +52,13 @@ def nodes(context):
     def remaps(*names):
         return [(name, topics[name]) for name in names if name in topics]
 
-    def node(name, remappings=(), prefix="", **parameters):
+    def node(name, remappings=(), prefix="", defaults=(), **parameters):
         return Node(
             prefix=prefix,
             package=f"gripsight_{name}",
             executable=name,
             name=name,
-            parameters=[value["params"], value["vehicle"], {**replay, **parameters}],
+            parameters=[*defaults, value["params"], value["vehicle"], {**replay, **parameters}],
             remappings=list(remappings),
             output="screen",
         )
@@ -76,9 +76,10 @@ def nodes(context):
         ),
     ]
     if value["camera"] == "true":
-        started.append(node("camera_prior", remaps("odom", "image", "image/compressed")))
+        settings = [str(project_folder() / "params" / "camera_prior.yaml")]
+        started.append(node("camera_prior", remaps("odom", "image", "image/compressed"), defaults=settings))
     elif value["prior_mu"]:
-        started.append(node("camera_prior", configured_mu=float(value["prior_mu"])))
+        started.append(node("camera_prior", input="none", configured_mu=float(value["prior_mu"])))
     if value["gap"] == "true":
         # The diagnosis never stands in the way of the other nodes.
         topics_in = [("sequence", "telemetry/sequence"), ("pacejka", "identifier/pacejka")]

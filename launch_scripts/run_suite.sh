@@ -13,7 +13,7 @@ Usage: launch_scripts/run_suite.sh --vehicle FILE [options]
   --rate RATE       speed of the replay                                                [1.0]
   --linger SECONDS  time for the last run after the bag's end                          [20]
   --prior-mu MU     publish this friction prior (else the camera_prior node has none)
-  --camera          use the camera's pictures for the friction prior
+  --camera          use the camera's pictures for the friction prior (params/camera_prior.yaml)
   --gap             diagnose the gap too (node gap_diagnosis)
   --bin FOLDER      where the nodes' binaries are                                      [target/release]
   -h, --help        this text
@@ -66,11 +66,12 @@ remaps() {
 
 pids=()
 priority=()
+defaults=()
 start() {
     local node=$1
     shift
     [[ -x $bin/$node ]] || fail "no binary '$bin/$node': build it with cargo build --release" 1
-    "${priority[@]}" "$bin/$node" --ros-args --params-file "$params" --params-file "$vehicle" "$@" &
+    "${priority[@]}" "$bin/$node" --ros-args "${defaults[@]}" --params-file "$params" --params-file "$vehicle" "$@" &
     pids+=($!)
 }
 # shellcheck disable=SC2329
@@ -94,9 +95,11 @@ start telemetry "${car[@]}" "${replay[@]}"
 start s4_residual -r sequence:=telemetry/sequence -r candidate:=identifier/candidate "${replay[@]}"
 start identifier -r sequence:=telemetry/sequence -r model:=s4_residual/model -r friction:=camera_prior/friction "${replay[@]}"
 if $camera; then
+    defaults=(--params-file "$root/params/camera_prior.yaml")
     start camera_prior "${eyes[@]}" "${replay[@]}"
+    defaults=()
 elif [[ -n $prior ]]; then
-    start camera_prior -p "configured_mu:=$prior" "${replay[@]}"
+    start camera_prior -p input:=none -p "configured_mu:=$prior" "${replay[@]}"
 fi
 if $gap; then
     # The diagnosis never stands in the way of the other nodes.
