@@ -68,16 +68,20 @@ impl Excitation {
             steering_rate_rms_radps: (rates.map(|r| r * r).sum::<f64>() / (n - 1.0)).sqrt(),
             v_y_rms_mps: (sequence.v_y_mps.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>() / n).sqrt(),
         };
-        excitation.insufficient = excitation.shortcoming(health.moving_share);
+        excitation.insufficient = excitation.shortcoming(&health);
         Ok(excitation)
     }
 
-    fn shortcoming(&self, moving_share: f64) -> Option<String> {
+    fn shortcoming(&self, health: &DataHealth) -> Option<String> {
         let span = |r: [f64; 2]| r[1] - r[0];
-        if self.duration_s < MIN_DURATION_S {
-            Some(format!("only {:.1} s of data: drive at least {MIN_DURATION_S} s", self.duration_s))
-        } else if moving_share < MIN_MOVING_SHARE {
-            Some(format!("the car moved in {:.0} % of the time only", 100.0 * moving_share))
+        // A sample stands for a step: 500 of them at 100 Hz are 5 s, though the last comes 4.99 s after the first. Half a step
+        // more for jitter.
+        let step_s = 1.0 / health.rate_hz;
+        let covered_s = self.duration_s + step_s;
+        if covered_s + step_s / 2.0 < MIN_DURATION_S {
+            Some(format!("only {covered_s:.2} s of data: drive at least {MIN_DURATION_S} s"))
+        } else if health.moving_share < MIN_MOVING_SHARE {
+            Some(format!("the car moved in {:.0} % of the time only", 100.0 * health.moving_share))
         } else if span(self.steering_range_rad) < MIN_STEERING_SPAN_RAD {
             Some(format!(
                 "the steering moved by {:.4} rad only: drive corners both ways",
@@ -127,6 +131,26 @@ mod tests {
         approx::assert_abs_diff_eq!(e.lateral_acceleration_range_mps2[1], 4.0, epsilon = 0.01);
         approx::assert_abs_diff_eq!(e.steering_rate_rms_radps, 0.2 / 2_f64.sqrt(), epsilon = 0.01);
         approx::assert_abs_diff_eq!(e.v_y_rms_mps, 0.1 / 2_f64.sqrt(), epsilon = 0.01);
+    }
+
+    #[test]
+    fn a_window_of_five_seconds_is_five_seconds_long() {
+        let of = |samples: usize| {
+            let mut sequence = weave();
+            for channel in [
+                &mut sequence.time_s,
+                &mut sequence.v_x_mps,
+                &mut sequence.v_y_mps,
+                &mut sequence.yaw_rate_radps,
+                &mut sequence.steering_rad,
+            ] {
+                channel.truncate(samples);
+            }
+            Excitation::of(&sequence).unwrap().insufficient
+        };
+        assert_eq!(of(500), None);
+        assert!(of(498).unwrap().starts_with("only 4.98 s of data"));
+        assert!(of(480).unwrap().starts_with("only 4.80 s of data"));
     }
 
     #[test]
