@@ -4,7 +4,7 @@ use gripsight_msgs::standard::ackermann_msgs::{AckermannDrive, AckermannDriveSta
 use gripsight_msgs::standard::builtin_interfaces::Time;
 use gripsight_msgs::standard::geometry_msgs::{Point, Quaternion, Vector3};
 use gripsight_msgs::standard::nav_msgs::Odometry;
-use gripsight_msgs::standard::sensor_msgs::{Imu, JointState};
+use gripsight_msgs::standard::sensor_msgs::{CompressedImage, Imu, JointState};
 use gripsight_msgs::standard::std_msgs::Header;
 use gripsight_signals::{DriveSample, ImuSample, OdometrySample, WheelsSample};
 
@@ -79,4 +79,10 @@ pub fn wheels(sample: &WheelsSample) -> JointState {
         velocity: sample.speed.to_vec(),
         effort: sample.effort_nm.map(|e| e.to_vec()).unwrap_or_default(),
     }
+}
+
+/// A picture that is a JPEG file already.
+#[must_use]
+pub fn jpeg(stamp_ns: i64, file: Vec<u8>) -> CompressedImage {
+    CompressedImage { header: header(stamp_ns, "camera"), format: "jpeg".to_owned(), data: file }
 }

@@ -5,13 +5,39 @@
 //! with sheen; a mirror; lit relief; a milky pane with cracks), written again: no code or random field is shared. Black ice,
 //! which looks like a wet road, is not drawn.
 
+use image::ExtendedColorType;
+use image::codecs::jpeg::JpegEncoder;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+use crate::error::ReferenceCarError;
 
 /// Friction coefficients that the five states stand for, from dry to ice: those of `params/friction_basis.yaml`.
 const STATE_MU: [f64; 5] = [0.85, 0.60, 0.42, 0.25, 0.10];
 /// How far the picture reaches along the road, metres.
 const REACH_M: f64 = 6.0;
+/// Quality of the JPEG files, of 100.
+const JPEG_QUALITY: u8 = 85;
+
+/// A moment at which the camera took a picture; [`RoadCamera::expose`] draws it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Exposure {
+    /// Time since the start of the run.
+    pub stamp_s: f64,
+    /// The car's place along the track.
+    pub position_m: f64,
+    /// Friction of the road there, wear and grip of the tires left out.
+    pub mu: f64,
+}
+
+impl Exposure {
+    /// The stamp counted from `start_ns`.
+    #[must_use]
+    pub fn stamp_ns(&self, start_ns: i64) -> i64 {
+        start_ns + (self.stamp_s * 1e9).round() as i64
+    }
+}
 
 /// An RGB picture, rows packed, 3 bytes a pixel.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -20,6 +46,23 @@ pub struct RoadPicture {
     pub side: u32,
     /// `side * side * 3` bytes.
     pub data: Vec<u8>,
+}
+
+impl RoadPicture {
+    /// The picture as a JPEG file.
+    ///
+    /// # Errors
+    /// `Picture` where the picture has no pixels or more than JPEG allows.
+    pub fn jpeg(&self) -> Result<Vec<u8>, ReferenceCarError> {
+        let mut file = Vec::new();
+        JpegEncoder::new_with_quality(&mut file, JPEG_QUALITY).encode(
+            &self.data,
+            self.side,
+            self.side,
+            ExtendedColorType::Rgb8,
+        )?;
+        Ok(file)
+    }
 }
 
 /// A camera that looks at one road.
@@ -45,6 +88,9 @@ pub struct RoadCamera {
 }
 
 impl RoadCamera {
+    /// Width and height of a run's pictures: what friction networks take.
+    pub const SIDE_PX: u32 = 224;
+
     /// A camera on the road number `seed`: its colour, grain, light and perspective follow from it.
     #[must_use]
     pub fn new(seed: u64) -> Self {
@@ -92,6 +138,14 @@ impl RoadCamera {
             }
         }
         self.develop(side, position_m, &light)
+    }
+
+    /// The picture of an exposure, [`SIDE_PX`](Self::SIDE_PX) wide and high, as a JPEG file.
+    ///
+    /// # Errors
+    /// `Picture` where it cannot be encoded.
+    pub fn expose(&self, exposure: &Exposure) -> Result<Vec<u8>, ReferenceCarError> {
+        self.picture(Self::SIDE_PX, exposure.position_m, exposure.mu).jpeg()
     }
 
     /// Light from the road at a point of the plane, where the lower state covers the share `covered`.

@@ -40,6 +40,9 @@ pub enum ReferenceCarError {
         /// Why it cannot be read.
         reason: String,
     },
+    /// A picture could not be encoded.
+    #[error("cannot encode a picture of the road")]
+    Picture(#[from] image::ImageError),
     /// The truth table could not be written.
     #[error("cannot write the truth table")]
     Truth(#[from] std::io::Error),

@@ -36,7 +36,7 @@ mod tire;
 mod track;
 mod truth;
 
-pub use camera::{RoadCamera, RoadPicture};
+pub use camera::{Exposure, RoadCamera, RoadPicture};
 pub use car::{CarParameters, DriveParameters, GRAVITY_MPS2, PitchParameters, RollParameters};
 pub use cars::CAR_NAMES;
 pub use driver::Command;

@@ -74,6 +74,11 @@ impl Road {
         Surroundings { friction, bank_rad, slope_rad, wind_x_mps, wind_y_mps }
     }
 
+    /// Friction of the road itself at a station: what a camera could see.
+    pub(crate) fn seen(&self, time_s: f64, station_m: f64) -> f64 {
+        self.friction_now(time_s) * self.patch_factor(station_m)
+    }
+
     fn friction_now(&self, time_s: f64) -> f64 {
         match &self.friction {
             Friction::Uniform { mu } | Friction::Patched { mu, .. } => *mu,

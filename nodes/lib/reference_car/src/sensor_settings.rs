@@ -40,6 +40,8 @@ pub struct SensorSettings {
     pub imu: Sampling,
     /// Wheel speeds.
     pub wheels: Sampling,
+    /// Pictures of the road a second; zero switches the camera off.
+    pub camera_rate_hz: f64,
     /// Odometry position, m.
     pub position: Noise,
     /// Odometry heading, rad.
@@ -64,7 +66,7 @@ impl Noise {
 }
 
 impl SensorSettings {
-    /// Everything at 100 Hz, exact.
+    /// Everything at 100 Hz, exact; no camera.
     pub fn exact() -> Self {
         let sampling = Sampling { rate_hz: 100.0, jitter_s: 0.0, dropped: 0.0 };
         let none = Noise::default();
@@ -73,6 +75,7 @@ impl SensorSettings {
             drive_dropped: 0.0,
             imu: sampling,
             wheels: sampling,
+            camera_rate_hz: 0.0,
             position: none,
             heading: none,
             v_x: none,
@@ -83,7 +86,7 @@ impl SensorSettings {
         }
     }
 
-    /// What a well-kept car of this size reports: 100 Hz, no jitter, nothing dropped, plain noise.
+    /// What a well-kept car of this size reports: 100 Hz, no jitter, nothing dropped, plain noise, no camera.
     pub fn for_car(car: &CarParameters) -> Self {
         let speed = car.top_speed_mps;
         let coloured = |white: f64, coloured: f64| Noise { white, coloured, correlation_s: 0.5, bias: 0.0 };
@@ -141,6 +144,8 @@ impl SensorSettings {
                 "in 0..1",
             )?;
         }
+        let camera = self.camera_rate_hz;
+        check("camera_rate_hz", camera, (0.0..=60.0).contains(&camera), "in 0..60 Hz")?;
         check("drive_dropped", self.drive_dropped, (0.0..1.0).contains(&self.drive_dropped), "in 0..1")?;
         let mut copy = *self;
         for noise in copy.noises_mut() {

@@ -1,5 +1,6 @@
 //! A run: the plant, its actuators, the road, the driver and the sensors, step by step.
 
+use crate::camera::Exposure;
 use crate::car::GRAVITY_MPS2;
 use crate::driver::{Command, Driver, View};
 use crate::error::{EndReason, ReferenceCarError};
@@ -24,6 +25,8 @@ pub struct Recording {
     pub samples: Vec<SensorSample>,
     /// The truth at each odometry stamp.
     pub truth: Vec<TruthSample>,
+    /// When and where the camera took pictures.
+    pub exposures: Vec<Exposure>,
     /// How the run ended.
     pub end: EndReason,
 }
@@ -50,6 +53,8 @@ pub struct Simulation {
     samples: Vec<SensorSample>,
     truth: Vec<TruthSample>,
     truth_times: Vec<f64>,
+    exposures: Vec<Exposure>,
+    exposed: u64,
 }
 
 impl Simulation {
@@ -95,6 +100,8 @@ impl Simulation {
             samples: Vec::new(),
             truth: Vec::new(),
             truth_times: Vec::new(),
+            exposures: Vec::new(),
+            exposed: 0,
             mechanisms,
             scenario,
         })
@@ -116,8 +123,9 @@ impl Simulation {
                 break;
             }
         }
+        let exposures = self.drain_exposures();
         let (samples, truth) = self.drain();
-        Recording { samples, truth, end }
+        Recording { samples, truth, exposures, end }
     }
 
     /// One step with the scenario's own driver.
@@ -200,6 +208,11 @@ impl Simulation {
         (samples, std::mem::take(&mut self.truth))
     }
 
+    /// Takes the camera's exposures since the last call.
+    pub fn drain_exposures(&mut self) -> Vec<Exposure> {
+        std::mem::take(&mut self.exposures)
+    }
+
     /// One step of the integration; the sensors report.
     ///
     /// # Errors
@@ -223,6 +236,7 @@ impl Simulation {
             },
         };
         self.record(time_s, &e, &around);
+        self.photograph(time_s);
         let next = self.plant.step(&self.state, &e, &middle, &around, dt_s);
         if !next.is_finite() {
             return Err(EndReason::NotFinite { time_s });
@@ -245,6 +259,17 @@ impl Simulation {
         self.sensors.sample(&before.motion, &truth.motion, &mut self.samples, &mut self.truth_times);
         self.truth.extend(self.truth_times.drain(..).map(|t| TruthSample::between(&before, &truth, t)));
         self.before = Some(truth);
+    }
+
+    /// Exposes at the first step that is not before the camera's next instant.
+    fn photograph(&mut self, time_s: f64) {
+        let rate_hz = self.scenario.sensors.camera_rate_hz;
+        if rate_hz > 0.0 && time_s + 1e-9 >= self.exposed as f64 / rate_hz {
+            self.exposed += 1;
+            let position_m = self.place.station_m;
+            let mu = self.road.seen(time_s, position_m);
+            self.exposures.push(Exposure { stamp_s: time_s, position_m, mu });
+        }
     }
 
     fn view(&self) -> View {

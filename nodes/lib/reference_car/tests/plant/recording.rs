@@ -2,7 +2,8 @@
 
 use approx::assert_relative_eq;
 use gripsight_reference_car::{
-    CarParameters, Noise, Scenario, SensorSample, SensorSettings, Simulation, truth_columns, write_truth_csv,
+    CarParameters, EffectSetting, Friction, Noise, RoadCamera, Scenario, SensorSample, SensorSettings,
+    Simulation, truth_columns, write_truth_csv,
 };
 
 fn f1tenth() -> Scenario {
@@ -81,4 +82,65 @@ fn a_scenario_survives_being_written_and_read() {
     scenario.effects = scenario.car.own_effects(0.9);
     let text = serde_json::to_string(&scenario).unwrap();
     assert_eq!(serde_json::from_str::<Scenario>(&text).unwrap(), scenario);
+}
+
+#[test]
+fn the_camera_exposes_at_its_rate_and_disturbs_no_other_sensor() {
+    let run = |camera_rate_hz: f64| {
+        let mut scenario = f1tenth().duration(6.0);
+        scenario.sensors.camera_rate_hz = camera_rate_hz;
+        Simulation::new(scenario).unwrap().run(|_| {})
+    };
+    let (with, without) = (run(2.0), run(0.0));
+    let stamps: Vec<f64> = with.exposures.iter().map(|e| e.stamp_s).collect();
+    assert_eq!(stamps, (0..13).map(|k| f64::from(k) * 0.5).collect::<Vec<_>>());
+    assert_eq!(without.exposures, []);
+    assert_eq!((with.samples, &with.truth), (without.samples, &without.truth));
+    for exposure in &with.exposures {
+        let nearest = with.truth.iter().find(|t| t.motion.time_s >= exposure.stamp_s - 1e-6).unwrap();
+        assert_relative_eq!(exposure.position_m, nearest.station_m, epsilon = 1e-3);
+    }
+}
+
+#[test]
+fn the_camera_sees_the_friction_of_the_road_at_the_car() {
+    let run = |scenario: Scenario| {
+        let mut scenario = scenario.duration(8.0);
+        scenario.sensors.camera_rate_hz = 10.0;
+        Simulation::new(scenario).unwrap().run(|_| {}).exposures
+    };
+    let changing = Friction::Changing { mu: 0.9, mu_after: 0.6, at_s: 4.0, over_s: 1.0 };
+    for e in run(f1tenth().friction(changing)) {
+        let expected = 0.9 - 0.3 * (e.stamp_s - 4.0).clamp(0.0, 1.0);
+        assert_relative_eq!(e.mu, expected, epsilon = 1e-9);
+    }
+    let patch = EffectSetting::parse("low_grip_patch=depth:0.25,start_m:10,length_m:5").unwrap();
+    let patched = run(f1tenth().effect(patch));
+    let inside = |e: &&gripsight_reference_car::Exposure| (10.5..14.5).contains(&e.position_m);
+    assert!(patched.iter().filter(inside).count() > 3);
+    assert!(patched.iter().filter(inside).all(|e| (e.mu - 0.675).abs() < 1e-9));
+    assert!(patched.iter().filter(|e| e.position_m < 10.0).all(|e| (e.mu - 0.9).abs() < 1e-9));
+    // Worn tires do not change the road's looks.
+    let worn = EffectSetting::parse("tire_wear").unwrap();
+    assert!(run(f1tenth().effect(worn)).iter().all(|e| (e.mu - 0.9).abs() < 1e-9));
+}
+
+#[test]
+fn pictures_are_the_same_bytes_for_the_same_seed_and_place() {
+    let mut scenario = f1tenth().duration(1.0);
+    scenario.sensors.camera_rate_hz = 2.0;
+    let exposures = Simulation::new(scenario).unwrap().run(|_| {}).exposures;
+    let files = |seed: u64| -> Vec<Vec<u8>> {
+        let camera = RoadCamera::new(seed);
+        exposures.iter().map(|e| camera.expose(e).unwrap()).collect()
+    };
+    let first = files(3);
+    assert_eq!(first, files(3));
+    assert!(first.iter().zip(files(4)).all(|(a, b)| *a != b));
+    assert_ne!(first[1], first[2]);
+    for file in &first {
+        let picture = image::load_from_memory(file).unwrap();
+        assert_eq!((picture.width(), picture.height()), (RoadCamera::SIDE_PX, RoadCamera::SIDE_PX));
+        assert!(file.len() < 40_000, "{} bytes", file.len());
+    }
 }
