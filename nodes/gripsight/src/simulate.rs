@@ -8,8 +8,8 @@ use anyhow::{Context, bail};
 use clap::Args;
 use gripsight_bag::{BagWriter, encode};
 use gripsight_reference_car::{
-    CAR_NAMES, CarParameters, Course, DriverKind, EFFECTS, EffectSetting, Friction, MANOEUVRE_NAMES,
-    Recording, Scenario, Simulation, TRACK_NAMES, write_truth_csv,
+    CAR_NAMES, CarParameters, Course, DriverKind, EFFECTS, EffectSetting, Exposure, Friction,
+    MANOEUVRE_NAMES, Recording, RoadCamera, Scenario, Simulation, TRACK_NAMES, write_truth_csv,
 };
 use gripsight_signals::Measurement;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -67,10 +67,13 @@ pub(crate) struct SimulateArgs {
     /// Standard deviation of the sampling instants.
     #[arg(long, value_name = "S", default_value_t = 0.0)]
     jitter: f64,
+    /// Record pictures of the road ahead, whose looks follow its friction, HZ of them a second (2 by default).
+    #[arg(long, value_name = "HZ", num_args = 0..=1, default_missing_value = "2")]
+    camera: Option<f64>,
     /// Length of the run in seconds.
     #[arg(long, value_name = "S", default_value_t = 30.0)]
     duration: f64,
-    /// Seed of noise, gusts and dither.
+    /// Seed of noise, gusts, dither and the road's looks.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// The bag to write: an .mcap file, or a rosbag2 folder.
@@ -81,7 +84,12 @@ pub(crate) struct SimulateArgs {
 fn names() -> String {
     let effects: Vec<&str> = EFFECTS.iter().map(|e| e.name).collect();
     format!(
-        "Cars: {}\nTracks: {}\nManoeuvres: {}\nEffects: {}",
+        "Examples:
+  gripsight simulate --car race_car --track club --mu 1.1 --realistic --out laps.mcap
+  gripsight simulate --effect steering_delay=0.04 --pace 0.9 --seed 7 --out late.mcap
+  gripsight simulate --mu 0.4 --camera --out wet.mcap
+
+Cars: {}\nTracks: {}\nManoeuvres: {}\nEffects: {}",
         CAR_NAMES.join(", "),
         TRACK_NAMES.join(", "),
         MANOEUVRE_NAMES.join(", "),
@@ -98,7 +106,7 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Outcome> {
     bar.finish_and_clear();
     let truth_path = beside(&args.out, "truth.csv");
     let vehicle_path = beside(&args.out, "vehicle.yaml");
-    let messages = write_bag(&args.out, &recording)?;
+    let messages = write_bag(&args.out, &recording, args.seed)?;
     let file =
         File::create(&truth_path).with_context(|| format!("cannot create {}", truth_path.display()))?;
     write_truth_csv(BufWriter::new(file), &recording.truth, START_NS as f64 * 1e-9)?;
@@ -144,6 +152,7 @@ fn scenario(args: &SimulateArgs) -> anyhow::Result<Scenario> {
         sampling.jitter_s = args.jitter;
     }
     sensors.drive_dropped = args.dropped;
+    sensors.camera_rate_hz = args.camera.unwrap_or(0.0);
     Ok(scenario.sensors(sensors))
 }
 
@@ -153,9 +162,14 @@ fn beside(bag: &Path, ending: &str) -> PathBuf {
     bag.with_file_name(format!("{stem}.{ending}"))
 }
 
-fn write_bag(path: &Path, recording: &Recording) -> anyhow::Result<usize> {
+fn write_bag(path: &Path, recording: &Recording, seed: u64) -> anyhow::Result<usize> {
     let mut bag = BagWriter::create(path)?;
+    let camera = RoadCamera::new(seed);
+    let mut exposures = recording.exposures.iter().peekable();
     for sample in &recording.samples {
+        while let Some(exposure) = exposures.next_if(|e| e.stamp_s <= sample.stamp_s()) {
+            write_picture(&mut bag, &camera, exposure)?;
+        }
         let measurement = sample.measurement(START_NS);
         let stamp_ns = measurement.stamp_ns();
         match measurement {
@@ -165,8 +179,17 @@ fn write_bag(path: &Path, recording: &Recording) -> anyhow::Result<usize> {
             Measurement::Wheels(m) => bag.write("/wheel_speeds", stamp_ns, &encode::wheels(&m))?,
         }
     }
+    for exposure in exposures {
+        write_picture(&mut bag, &camera, exposure)?;
+    }
     bag.finish()?;
-    Ok(recording.samples.len())
+    Ok(recording.samples.len() + recording.exposures.len())
+}
+
+fn write_picture(bag: &mut BagWriter, camera: &RoadCamera, exposure: &Exposure) -> anyhow::Result<()> {
+    let stamp_ns = exposure.stamp_ns(START_NS);
+    let picture = encode::jpeg(stamp_ns, camera.expose(exposure)?);
+    Ok(bag.write("/camera/image/compressed", stamp_ns, &picture)?)
 }
 
 /// The nominal car as the other subcommands read it.

@@ -1,6 +1,7 @@
 //! Drive commands in, sensors and `/clock` out.
 
 use std::future::Future;
+use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::bail;
@@ -8,10 +9,11 @@ use gripsight_bag::{decode, encode};
 use gripsight_msgs::standard::ackermann_msgs::AckermannDriveStamped;
 use gripsight_msgs::standard::nav_msgs::Odometry;
 use gripsight_msgs::standard::rosgraph_msgs::Clock;
-use gripsight_msgs::standard::sensor_msgs::{Imu, JointState};
-use gripsight_reference_car::{Command, EndReason, Simulation};
+use gripsight_msgs::standard::sensor_msgs::{CompressedImage, Imu, JointState};
+use gripsight_reference_car::{Command, EndReason, Exposure, RoadCamera, Simulation};
 use gripsight_runtime::{Diagnostics, Node, Publisher, Qos, Subscription};
 use gripsight_signals::Measurement;
+use tokio::sync::mpsc;
 
 use crate::diagnostics::{State, status};
 use crate::settings::{Settings, Wheel};
@@ -24,6 +26,8 @@ const REPORT_PERIOD: Duration = Duration::from_millis(200);
 const LAG_GIVEN_UP_S: f64 = 1.0;
 /// Depth of the sensors' queues.
 const DEPTH: usize = 50;
+/// Depth of the queue of pictures.
+const PICTURE_DEPTH: usize = 2;
 
 /// Declares parameters and topics; gives the node's work.
 pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyhow::Result<()>> + use<>> {
@@ -34,12 +38,17 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
     };
     let clock =
         if settings.publish_clock { Some(node.publisher("/clock", Qos::reliable(10))?) } else { None };
+    let pictures = (settings.scenario.sensors.camera_rate_hz > 0.0)
+        .then(|| node.publisher("image/compressed", Qos::reliable(PICTURE_DEPTH)))
+        .transpose()?
+        .map(|topic| develop(topic, settings.scenario.seed));
     let outputs = Outputs {
         odometry: node.publisher("odom", Qos::reliable(DEPTH))?,
         imu: node.publisher("imu", Qos::reliable(DEPTH))?,
         wheels: node.publisher("wheels", Qos::reliable(DEPTH))?,
         drive,
         clock,
+        pictures,
         start_ns: SystemTime::now().duration_since(UNIX_EPOCH).map(|d| d.as_nanos() as i64).unwrap_or(0),
     };
     let car = LiveCar {
@@ -61,6 +70,8 @@ struct Outputs {
     /// The own driver's commands.
     drive: Option<Publisher<AckermannDriveStamped>>,
     clock: Option<Publisher<Clock>>,
+    /// Exposures with their stamps, to be drawn and published.
+    pictures: Option<mpsc::Sender<(i64, Exposure)>>,
     /// Stamp of the car's time zero.
     start_ns: i64,
 }
@@ -149,11 +160,34 @@ impl LiveCar {
                 }
             }
         }
+        for exposure in self.simulation.drain_exposures() {
+            if let Some(pictures) = &out.pictures {
+                // Where drawing cannot keep up, pictures are left out.
+                let _full = pictures.try_send((exposure.stamp_ns(out.start_ns), exposure));
+            }
+        }
         if let Some(clock) = &out.clock {
             let now_ns = out.start_ns + (self.simulation.time_s() * 1e9) as i64;
             clock.publish(&Clock { clock: encode::time(now_ns) }).await;
         }
     }
+}
+
+/// Draws and publishes pictures beside the car, which does not wait for them.
+fn develop(topic: Publisher<CompressedImage>, seed: u64) -> mpsc::Sender<(i64, Exposure)> {
+    let (sender, mut exposures) = mpsc::channel::<(i64, Exposure)>(PICTURE_DEPTH);
+    let camera = Arc::new(RoadCamera::new(seed));
+    tokio::spawn(async move {
+        while let Some((stamp_ns, exposure)) = exposures.recv().await {
+            let camera = Arc::clone(&camera);
+            match tokio::task::spawn_blocking(move || camera.expose(&exposure)).await {
+                Ok(Ok(file)) => topic.publish(&encode::jpeg(stamp_ns, file)).await,
+                Ok(Err(error)) => tracing::warn!("a picture is left out: {error}"),
+                Err(error) => tracing::warn!("a picture is left out: {error}"),
+            }
+        }
+    });
+    sender
 }
 
 /// The next command; never, where none are taken.

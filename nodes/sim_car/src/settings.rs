@@ -59,6 +59,8 @@ impl Settings {
         let mu = number("mu", 0.9, 0.01, 3.0, "Friction of the road")?;
         let pace = number("pace", 0.8, 0.05, 2.0, "Share of the grip that the own driver plans to use")?;
         let noise = number("noise", 1.0, 0.0, 100.0, "Sensor noise over its usual size")?;
+        let camera_rate_hz =
+            number("camera_rate_hz", 0.0, 0.0, 60.0, "Pictures of the road a second; zero: none")?;
         let command_timeout_s = number(
             "command_timeout_s",
             0.5,
@@ -66,8 +68,11 @@ impl Settings {
             60.0,
             "Age from which a drive command no longer counts (s)",
         )?;
-        let seed =
-            node.parameter("seed", 1_i64, Descriptor::new("Seed of noise, gusts and dither").read_only())?;
+        let seed = node.parameter(
+            "seed",
+            1_i64,
+            Descriptor::new("Seed of noise, gusts, dither and the road's looks").read_only(),
+        )?;
         let rate = node.parameter(
             "rate",
             1.0,
@@ -94,7 +99,8 @@ impl Settings {
             scenario.effects.retain(|own| asked.iter().all(|a| a.name != own.name));
         }
         scenario.effects.extend(asked);
-        let sensors = scenario.sensors.scaled(noise);
+        let mut sensors = scenario.sensors.scaled(noise);
+        sensors.camera_rate_hz = camera_rate_hz;
         Ok(Self { scenario: scenario.sensors(sensors), wheel, rate, publish_clock, command_timeout_s })
     }
 }
