@@ -103,17 +103,21 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     let header = header(subject, &vehicle, &sequence);
     let page = gap_page(&GapInput { diagnosis: &result, header: &header, data_notes: &data_notes(&report) })?;
     let timing = Timing { reading_s, diagnosing_s, total_s: start.elapsed().as_secs_f64() };
-    for (name, text) in [
+    let mut files = vec![
         ("gap.json", serde_json::to_string_pretty(&result)? + "\n"),
         ("report.html", page),
-        ("extended_model.yaml", result.extended_model().to_yaml()?),
         ("timing.json", serde_json::to_string_pretty(&timing)? + "\n"),
-    ] {
+    ];
+    if result.verdict != Verdict::NotIdentifiable {
+        files.push(("extended_model.yaml", result.extended_model().to_yaml()?));
+    }
+    for (name, text) in &files {
         let path = args.out.join(name);
         fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
     }
     print!("{}", result.text());
-    println!("files      {} (gap.json, report.html, extended_model.yaml, timing.json)", args.out.display());
+    let names: Vec<&str> = files.iter().map(|f| f.0).collect();
+    println!("files      {} ({})", args.out.display(), names.join(", "));
     Ok(outcome(&result))
 }
 

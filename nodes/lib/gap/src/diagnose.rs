@@ -1,19 +1,17 @@
 //! The way from a recording to a diagnosis.
 
-use std::collections::BTreeMap;
-
 use gripsight_signals::{DataHealth, StateSequence};
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 
+use crate::budget::{Budget, Models};
 use crate::effects::{EffectId, Need};
 use crate::engine::{Engine, State, TireTrust};
-use crate::evaluate::{by_block, interval, mean};
-use crate::flexible::Flexible;
-use crate::outcome::{DetectionLimit, Diagnosis, GapBudget, Invisible, TirePair};
+use crate::outcome::{DetectionLimit, Diagnosis, Invisible, TirePair};
 use crate::recording::Recording;
 use crate::select::{Round, reweigh, round, thresholds};
-use crate::verdict::{Budget, decide, rank};
-use crate::windows::{HORIZON_S, NEEDED_S, Split, Windows, split};
+use crate::usable::{Usable, cannot_tell, refused, usable};
+use crate::verdict::{decide, rank};
+use crate::windows::{Windows, split};
 use crate::{GapError, pictures, place};
 
 /// What is diagnosed, and with what.
@@ -39,8 +37,6 @@ pub struct Request<'a> {
 const GENERIC: [f64; 8] = [6.5, 1.5, 1.0, 0.0, 6.5, 1.5, 1.0, 0.0];
 /// Windows that the search works on, at most.
 const SEARCH_WINDOWS: usize = 70;
-/// Held-out time that a score needs.
-const LEAST_HELD_OUT_S: f64 = 3.0;
 
 /// Diagnoses a recording. `progress` is told what is being done, in a few words.
 ///
@@ -49,24 +45,21 @@ const LEAST_HELD_OUT_S: f64 = 3.0;
 /// `not_identifiable`.
 pub fn diagnose(request: &Request<'_>, progress: &mut dyn FnMut(&str)) -> Result<Diagnosis, GapError> {
     let data_health = DataHealth::of(request.sequence)?;
-    let recording = Recording::new(request.sequence)?;
-    let other = request.held_out.map(Recording::new).transpose()?;
-    let mut windows = split(&recording, other.is_none());
-    if windows.held_out.duration_s(recording.dt_s()) < LEAST_HELD_OUT_S && other.is_none() {
-        windows = split(&recording, false);
+    match usable(request, &data_health) {
+        Ok(usable) => explain(request, usable, data_health, progress),
+        Err(error) if cannot_tell(&error) => Ok(refused(request, &error, data_health)),
+        Err(error) => Err(error),
     }
-    let usable_s =
-        windows.training.duration_s(recording.dt_s()) + windows.held_out.duration_s(recording.dt_s());
-    if usable_s < NEEDED_S {
-        return Err(GapError::TooLittle {
-            usable_s,
-            recorded_s: recording.recorded_s,
-            needed_s: NEEDED_S,
-            least_speed_mps: recording.least_speed_mps,
-        });
-    }
-    informative(&recording)?;
+}
 
+fn explain(
+    request: &Request<'_>,
+    usable: Usable,
+    data_health: DataHealth,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Diagnosis, GapError> {
+    let Usable { recording, windows } = usable;
+    let other = request.held_out.map(Recording::new).transpose()?;
     progress("fitting the tires");
     let (tires, trust) = match (request.tires, request.reference) {
         (Some(tires), _) => (tires, TireTrust::file()),
@@ -132,8 +125,10 @@ pub fn diagnose(request: &Request<'_>, progress: &mut dyn FnMut(&str)) -> Result
         (null, state)
     };
     progress("scoring on held-out data");
-    let budget = budget(&engine, other.as_ref(), &windows, &nominal, &null, &state, &rounds);
-    let verdict = decide(&budget, &rounds, &state, instead);
+    let models = Models { nominal: &nominal, null: &null, state: &state, rounds: &rounds, instead };
+    let budget = Budget::of(&engine, other.as_ref(), &windows, &models);
+    let (verdict, mut reasons) = decide(&budget, &rounds, &state, instead);
+    reasons.extend(crate::noise::caveat(&recording));
     let effects = rank(&rounds, &state, &budget);
     let scored_windows =
         if windows.held_out.windows.is_empty() { &windows.training } else { &windows.held_out };
@@ -157,8 +152,8 @@ pub fn diagnose(request: &Request<'_>, progress: &mut dyn FnMut(&str)) -> Result
         })
         .unwrap_or_default();
     Ok(Diagnosis {
-        verdict: verdict.0,
-        reasons: verdict.1,
+        verdict,
+        reasons,
         drive_next: crate::verdict::drive_next(&effects),
         effects,
         invisible,
@@ -239,124 +234,4 @@ fn library(
         }
     }
     Ok((library, invisible))
-}
-
-/// Refuses recordings in which nothing happens.
-fn informative(recording: &Recording) -> Result<(), GapError> {
-    const LEAST_STEERING_RAD: f64 = 2e-3;
-    const LEAST_A_Y_MPS2: f64 = 0.4;
-    let rms = |values: &mut dyn Iterator<Item = f64>| {
-        let (n, s) = values.fold((0.0_f64, 0.0_f64), |(n, s), v| (n + 1.0, s + v * v));
-        if n > 0.0 { f64::sqrt(s / n) } else { 0.0 }
-    };
-    let steering = rms(&mut recording.runs.iter().flat_map(|r| r.steering_rad.iter().copied()));
-    let a_y = rms(&mut recording
-        .runs
-        .iter()
-        .flat_map(|r| r.v_x_mps.iter().zip(&r.measured[1]).map(|(v, w)| v * w)));
-    if a_y < LEAST_A_Y_MPS2 || steering < LEAST_STEERING_RAD {
-        return Err(GapError::NoInformation {
-            what: "cornering",
-            detail: format!(
-                "RMS lateral acceleration {a_y:.2} m/s2 (at least {LEAST_A_Y_MPS2} needed), RMS steering {steering:.4} rad (at least {LEAST_STEERING_RAD})"
-            ),
-        });
-    }
-    let v_y = rms(&mut recording.runs.iter().flat_map(|r| r.measured[0].iter().copied()));
-    if v_y < 1e-6 {
-        return Err(GapError::NoInformation {
-            what: "v_y",
-            detail: "the odometry's lateral velocity is zero throughout: its estimator does not provide it"
-                .to_owned(),
-        });
-    }
-    Ok(())
-}
-
-fn budget(
-    engine: &Engine<'_>,
-    other: Option<&Recording>,
-    windows: &Split,
-    nominal: &[f64],
-    null: &State,
-    state: &State,
-    rounds: &[Round],
-) -> Budget {
-    // The other bag has its own noise; models and weights are those fitted here.
-    let foreign = other.map(|r| (Engine { recording: r, ..engine.clone() }, split(r, false)));
-    let (scorer, on, scored_on): (&Engine<'_>, Windows, _) = match &foreign {
-        Some((e, s)) => (e, crate::windows::of_length(e.recording, &s.training, HORIZON_S), "another bag"),
-        None if windows.held_out.windows.is_empty() => (
-            engine,
-            crate::windows::of_length(engine.recording, &windows.training, HORIZON_S),
-            "training blocks (too little data to hold any out)",
-        ),
-        None => (engine, windows.held_out.clone(), "held-out blocks"),
-    };
-    let blocks = |effects: &[EffectId], flexible: Option<&Flexible>, p: &[f64]| {
-        by_block(scorer.recording, &on, &scorer.score(effects, flexible, p, &on))
-    };
-    let slip = large_slip_rad(engine, null, &windows.training);
-    let flexible = Flexible::new(engine.recording, slip, engine.vehicle.wheelbase_m());
-    let ceiling_values = engine.fit_flexible(state, &flexible, &windows.training);
-    let mut steps = vec![blocks(&[], None, &null.parameters)];
-    let mut so_far = Vec::new();
-    for round in rounds {
-        if let Some(best) = round.taken.and_then(|i| round.refits.get(i)) {
-            so_far.push(best.effect);
-            if so_far.len() < state.effects.len() {
-                steps.push(blocks(&so_far, None, &best.state.parameters));
-            }
-        }
-    }
-    if !state.effects.is_empty() {
-        steps.push(blocks(&state.effects, None, &state.parameters));
-    }
-    let ceiling = blocks(&state.effects, Some(&flexible), &ceiling_values);
-    Budget::new(blocks(&[], None, nominal), steps, ceiling, scored_on)
-}
-
-/// A large slip angle of the recording on the fitted tires.
-fn large_slip_rad(engine: &Engine<'_>, null: &State, windows: &Windows) -> f64 {
-    let car = gripsight_vehicle::SingleTrack::new(engine.vehicle, &null.tires());
-    let mut slips = Vec::new();
-    for w in &windows.windows {
-        let run = &engine.recording.runs[w.segment];
-        for k in (w.from..w.from + w.len).step_by(5) {
-            let state =
-                gripsight_vehicle::State { v_y_mps: run.smooth[0][k], yaw_rate_radps: run.smooth[1][k] };
-            let input =
-                gripsight_vehicle::Input { v_x_mps: run.v_x_mps[k], steering_rad: run.steering_rad[k] };
-            let (f, r) = car.slip_angles_rad(&state, &input);
-            slips.push(f.abs().max(r.abs()));
-        }
-    }
-    crate::smooth::quantile(slips, 0.8)
-}
-
-impl Budget {
-    fn stated(&self, recording: &Recording) -> GapBudget {
-        let channel_noise: BTreeMap<&'static str, f64> = recording
-            .channels
-            .iter()
-            .zip(&recording.sigma)
-            .filter(|(c, _)| c.scored())
-            .map(|(c, s)| (c.name(), *s))
-            .collect();
-        let after = self.steps.last().map(|b| interval(b)).unwrap_or_default();
-        let mut ceiling = interval(&self.ceiling);
-        if mean(&self.ceiling) > after.value {
-            ceiling = after;
-        }
-        GapBudget {
-            nominal: interval(&self.nominal),
-            retuned: self.steps.first().map(|b| interval(b)).unwrap_or_default(),
-            after,
-            unstructured_ceiling: ceiling,
-            noise_floor: self.floor,
-            horizon_s: HORIZON_S,
-            channel_noise,
-            scored_on: self.scored_on,
-        }
-    }
 }

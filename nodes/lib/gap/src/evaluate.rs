@@ -8,7 +8,7 @@ use crate::engine::Score;
 use crate::recording::Recording;
 use crate::windows::Windows;
 
-/// A figure with its 90 % interval.
+/// A figure with its 90 % interval. What is not known is not a number, `null` in JSON.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Estimate {
     /// Best value.
@@ -17,6 +17,11 @@ pub struct Estimate {
     pub low: f64,
     /// Upper end of the 90 % interval.
     pub high: f64,
+}
+
+impl Estimate {
+    /// Not known: `null` in JSON.
+    pub const UNKNOWN: Self = Self { value: f64::NAN, low: f64::NAN, high: f64::NAN };
 }
 
 /// Resamples of a bootstrap.
@@ -29,10 +34,18 @@ fn freedom(recording: &Recording, len: usize) -> f64 {
     ((len * scored().count()) as f64 - 2.0 - means as f64).max(1.0)
 }
 
-/// Mean squared error over the noise variance of every block: (sum of squares, degrees of freedom).
+/// Blocks that a bootstrap needs.
+const LEAST_BLOCKS: usize = 3;
+
+/// Mean squared error over the noise variance of every block: (sum of squares, degrees of freedom). Of fewer than three blocks every
+/// window counts as one, and intervals come out too narrow.
 pub(crate) fn by_block(recording: &Recording, windows: &Windows, score: &Score) -> Vec<(f64, f64)> {
     let mut blocks: Vec<(usize, f64, f64)> = Vec::new();
-    for ((window, &block), &square) in windows.windows.iter().zip(&windows.block).zip(&score.squares) {
+    let mut numbers = windows.block.clone();
+    numbers.dedup();
+    let few = numbers.len() < LEAST_BLOCKS;
+    for (k, (window, &square)) in windows.windows.iter().zip(&score.squares).enumerate() {
+        let block = if few { k } else { windows.block[k] };
         let n = freedom(recording, window.len);
         match blocks.last_mut().filter(|b| b.0 == block) {
             Some(last) => {
@@ -55,7 +68,7 @@ pub(crate) fn mean(blocks: &[(f64, f64)]) -> f64 {
 pub(crate) fn bootstrap(blocks: usize, statistic: impl Fn(&[usize]) -> f64) -> Estimate {
     let plain: Vec<usize> = (0..blocks).collect();
     let value = statistic(&plain);
-    if blocks < 3 {
+    if blocks < LEAST_BLOCKS {
         return Estimate { value, low: f64::NEG_INFINITY, high: f64::INFINITY };
     }
     let mut random = ChaCha8Rng::seed_from_u64(0x6a70);
@@ -70,10 +83,13 @@ pub(crate) fn bootstrap(blocks: usize, statistic: impl Fn(&[usize]) -> f64) -> E
     Estimate { value, low: at(0.05).min(value), high: at(0.95).max(value) }
 }
 
+/// The mean over the blocks drawn.
+pub(crate) fn of_picked(blocks: &[(f64, f64)], picked: &[usize]) -> f64 {
+    let (s, n) = picked.iter().fold((0.0, 0.0), |(s, n), &i| (s + blocks[i].0, n + blocks[i].1));
+    s / f64::max(n, 1.0)
+}
+
 /// The mean with its interval.
 pub(crate) fn interval(blocks: &[(f64, f64)]) -> Estimate {
-    bootstrap(blocks.len(), |picked| {
-        let (s, n) = picked.iter().fold((0.0, 0.0), |(s, n), &i| (s + blocks[i].0, n + blocks[i].1));
-        s / n.max(1.0)
-    })
+    bootstrap(blocks.len(), |picked| of_picked(blocks, picked))
 }

@@ -39,6 +39,7 @@
 //! One line in the list `library!` of `effects/mod.rs` adds it to the search, the file format, `--without` and the tests: at its null value it
 //! must leave the nominal model exactly as it was. If its derivative vanishes there, say `flat_at_null` and give `starts`.
 
+mod budget;
 mod diagnose;
 mod effects;
 mod engine;
@@ -60,6 +61,7 @@ mod smooth;
 mod station;
 mod terms;
 mod text;
+mod usable;
 mod verdict;
 mod windows;
 

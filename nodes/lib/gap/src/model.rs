@@ -236,7 +236,7 @@ mod tests {
             v_x_mps: at(&|t| 5.0 + (0.7 * t).sin()),
             v_y_mps: (0..n).map(|k| noise(k, 0.02)).collect(),
             yaw_rate_radps: (0..n).map(|k| (k as f32 * 0.02).sin() + noise(k + 5, 0.01)).collect(),
-            steering_rad: at(&|t| 0.08 * (3.0 * t).sin()),
+            steering_rad: at(&|t| 0.15 * (5.0 * t).sin()),
             a_x_mps2: (0..n).map(|k| noise(k + 9, 0.1)).collect(),
             a_y_mps2: (0..n).map(|k| 5.0 * (k as f32 * 0.02).sin() + noise(k + 31, 0.1)).collect(),
             ..StateSequence::default()
@@ -291,7 +291,8 @@ mod tests {
 
     #[test]
     fn every_effect_shows_where_its_signals_are() {
-        let recording = recording(4);
+        // Some effects show only against a longitudinal command.
+        let recording = Recording { has_command: true, ..recording(4) };
         let vehicle = VehicleParameters::f1tenth();
         let window = Window { segment: 0, from: 120, len: 60 };
         let mut base = tires_to_parameters(&tires()).to_vec();

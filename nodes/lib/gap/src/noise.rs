@@ -4,7 +4,7 @@
 //! knocks do not count. Coloured noise and filtered signals are underestimated; chi2 and floor are then relative to this figure,
 //! as the report says.
 
-use crate::recording::Run;
+use crate::recording::{Recording, Run};
 use crate::smooth::median;
 
 /// Order of the difference.
@@ -20,6 +20,30 @@ const LEAST_SHARE: f64 = 2e-3;
 pub(crate) fn sigma(runs: &[Run], c: usize) -> f64 {
     let noise = of(runs.iter().map(|r| r.measured[c].as_slice()));
     noise.max(LEAST_SHARE * spread(runs, c, true)).max(1e-6)
+}
+
+/// A noise that seems so many times larger at half the rate is not white: filtered, simulated, or not to be told from the motion.
+const WHITE_RATIO: f64 = 1.4;
+
+/// Whether the noise of channel `c` can be told: above the least share, and the same at half the rate.
+pub(crate) fn is_clear(runs: &[Run], c: usize) -> bool {
+    let noise = of(runs.iter().map(|r| r.measured[c].as_slice()));
+    let halved: Vec<Vec<f64>> =
+        runs.iter().map(|r| r.measured[c].iter().step_by(2).copied().collect()).collect();
+    noise > LEAST_SHARE * spread(runs, c, true) && of(halved.iter().map(Vec::as_slice)) < WHITE_RATIO * noise
+}
+
+/// A sentence where the noise cannot be told from the signals.
+pub(crate) fn caveat(recording: &Recording) -> Option<String> {
+    let scored = (0..recording.channels.len()).filter(|&c| recording.channels[c].scored());
+    let names: Vec<&str> =
+        scored.filter(|&c| !is_clear(&recording.runs, c)).map(|c| recording.channels[c].name()).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "noise cannot be told from these signals ({}: smoothed, interpolated or simulated): the floor is a lower bound, and so is every share of the gap; read the errors against each other, not against 1",
+            names.join(", ")
+        )
+    })
 }
 
 /// Standard deviation of the noise of a series in stretches.
@@ -85,17 +109,9 @@ mod tests {
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 
-    #[test]
-    fn white_noise_on_a_moving_signal_is_measured() {
-        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
-        let signal: Vec<f64> = (0..6000)
-            .map(|k| {
-                let noise: f64 = StandardNormal.sample(&mut random);
-                (f64::from(k) * 0.01 * 6.0).sin() + 0.02 * noise
-            })
-            .collect();
+    fn run(signal: Vec<f64>) -> Run {
         let n = signal.len();
-        let run = Run {
+        Run {
             start_time_s: 0.0,
             dt_s: 0.01,
             v_x_mps: vec![1.0; n],
@@ -105,7 +121,20 @@ mod tests {
             lap_share: vec![0.0; n],
             smooth: [vec![0.0; n], vec![0.0; n]],
             measured: vec![signal],
-        };
-        approx::assert_relative_eq!(sigma(&[run], 0), 0.02, max_relative = 0.05);
+        }
+    }
+
+    #[test]
+    fn white_noise_on_a_moving_signal_is_measured_and_smoothed_noise_is_not_trusted() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+        let noise: Vec<f64> = (0..6000).map(|_| StandardNormal.sample(&mut random)).collect();
+        let motion = |k: usize| (k as f64 * 0.01 * 6.0).sin();
+        let rough = [run(noise.iter().enumerate().map(|(k, n)| motion(k) + 0.02 * n).collect())];
+        approx::assert_relative_eq!(sigma(&rough, 0), 0.02, max_relative = 0.05);
+        assert!(is_clear(&rough, 0));
+        let mean = |w: &[f64]| w.iter().sum::<f64>() / w.len() as f64;
+        let filtered = [run(noise.windows(2).enumerate().map(|(k, w)| motion(k) + 0.02 * mean(w)).collect())];
+        assert!(!is_clear(&filtered, 0));
+        assert!(!is_clear(&[run((0..6000).map(motion).collect())], 0));
     }
 }

@@ -38,7 +38,7 @@ impl Verdict {
     }
 }
 
-/// A parameter of an effect with its 90 % interval.
+/// A parameter of an effect with its 90 % interval. A limit that is not there is infinite, `null` in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EffectParameter {
     /// Best value.
@@ -60,7 +60,9 @@ pub struct RankedEffect {
     pub accepted: bool,
     /// Sizes by name.
     pub parameters: BTreeMap<&'static str, EffectParameter>,
-    /// Share of the gap between retuned tires and noise floor that it closes on held-out data, after those above it.
+    /// Share of the gap between retuned tires and noise floor that it closes on held-out data, after the accepted ones above it; negative:
+    /// it makes held-out errors larger. Unknown (`null`) where that gap's interval reaches down to the noise, where the share's own is
+    /// wider than twice the gap, where the effect stands in place of a retune, and beyond the three best that were not accepted.
     pub gap_closed_fraction: Estimate,
     /// Stated chance that it is the cause.
     pub confidence: f64,
@@ -197,9 +199,9 @@ pub struct Diagnosis {
     pub identities: Vec<Identity>,
     /// How large it is, step by step.
     pub gap: GapBudget,
-    /// (retuned - after)/(retuned - noise floor).
+    /// (retuned - after)/(retuned - noise floor); unknown (`null`) where the share of an effect is.
     pub gap_closed_fraction: Estimate,
-    /// Tires with and without the effects.
+    /// Tires with and without the effects; unknown (`null`) where the data cannot tell and none were given.
     pub tires: TirePair,
     /// Rates, gaps, jitter, frozen channels.
     pub data_health: DataHealth,

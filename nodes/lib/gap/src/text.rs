@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use crate::Estimate;
-use crate::outcome::{Diagnosis, Place};
+use crate::outcome::{Diagnosis, Place, Verdict};
 
 impl Diagnosis {
     /// The diagnosis in some 25 lines.
@@ -24,6 +24,10 @@ impl Diagnosis {
             health.gaps.len(),
             health.frozen.len()
         );
+        if self.verdict == Verdict::NotIdentifiable {
+            self.reasons_text(&mut out, 0);
+            return out;
+        }
         for identity in &self.identities {
             let _ = writeln!(out, "identity   {}: {}", identity.name, identity.finding);
         }
@@ -52,7 +56,10 @@ impl Diagnosis {
             let parameters: Vec<String> = e
                 .parameters
                 .iter()
-                .map(|(name, p)| format!("{name} {:.4} [{:.4}, {:.4}]", p.value, p.low, p.high))
+                .map(|(name, p)| match p.value.is_finite() {
+                    true => format!("{name} {:.4} [{:.4}, {:.4}]", p.value, p.low, p.high),
+                    false => format!("{name} none"),
+                })
                 .collect();
             let group = if e.confused_with.is_empty() {
                 String::new()
@@ -61,39 +68,65 @@ impl Diagnosis {
             };
             let _ = writeln!(
                 out,
-                "{mark} {:<26} {}  closes {:.0} %  sure {:.2}{group}",
+                "{mark} {:<26} {}  closes {}  sure {:.2}{group}",
                 e.name,
                 parameters.join(", "),
-                100.0 * e.gap_closed_fraction.value,
+                percent(e.gap_closed_fraction.value),
                 e.confidence
             );
         }
-        if let Some(worst) = worst(&self.places.channel) {
-            let _ = writeln!(
-                out,
-                "where      {} holds {:.0} % of the squared error",
-                worst.channel,
-                100.0 * worst.share
-            );
-        }
-        if let Some(p) = worst(&self.places.lateral_acceleration) {
-            let _ = writeln!(
-                out,
-                "           most at {:.1} to {:.1} {} of lateral acceleration",
-                p.low, p.high, p.unit
-            );
-        }
+        self.places_text(&mut out);
         if !self.invisible.is_empty() {
             let names: Vec<&str> = self.invisible.iter().map(|i| i.name).collect();
             let _ = writeln!(out, "invisible  {}", names.join(", "));
         }
-        for reason in self.reasons.iter().skip(1) {
+        self.reasons_text(&mut out, 1);
+        out
+    }
+
+    fn reasons_text(&self, out: &mut String, skipped: usize) {
+        for reason in self.reasons.iter().skip(skipped) {
             let _ = writeln!(out, "because    {reason}");
         }
         for next in &self.drive_next {
             let _ = writeln!(out, "next       {next}");
         }
-        out
+    }
+
+    /// The channels by their share, and the circumstances that stand out most from an even spread.
+    fn places_text(&self, out: &mut String) {
+        const SHOWN: usize = 3;
+        let w = &self.places;
+        let mut channels: Vec<&Place> = w.channel.iter().collect();
+        channels.sort_by(|a, b| b.share.total_cmp(&a.share));
+        let shares: Vec<String> =
+            channels.iter().map(|p| format!("{} {}", p.channel, percent(p.share))).collect();
+        let _ = writeln!(out, "where      of the squared error: {}", shares.join(", "));
+        let circumstances: [(&str, &[Place]); 7] = [
+            ("speed", &w.speed),
+            ("lateral acceleration", &w.lateral_acceleration),
+            ("slip", &w.slip),
+            ("steering rate", &w.steering_rate),
+            ("longitudinal acceleration", &w.longitudinal_acceleration),
+            ("place on the lap", &w.track_position),
+            ("time", &w.time),
+        ];
+        // Bins hold equally many samples: an even spread is one over their number.
+        let mut worst: Vec<(f64, &str, &Place)> = circumstances
+            .into_iter()
+            .filter_map(|(name, bins)| worst(bins).map(|p| (p.share * bins.len() as f64, name, p)))
+            .collect();
+        worst.sort_by(|a, b| b.0.total_cmp(&a.0));
+        for (times, name, p) in worst.into_iter().take(SHOWN) {
+            let _ = writeln!(
+                out,
+                "           {name} {:.3} to {:.3} {}: {}, {times:.1} times its share of the samples",
+                p.low,
+                p.high,
+                p.unit,
+                percent(p.share)
+            );
+        }
     }
 }
 
@@ -102,5 +135,13 @@ fn worst(places: &[Place]) -> Option<&Place> {
 }
 
 fn figure(e: Estimate) -> String {
-    format!("{:.3} [{:.3}, {:.3}]", e.value, e.low, e.high)
+    if !e.value.is_finite() {
+        return "not stated".to_owned();
+    }
+    let digits = if e.value.abs() < 100.0 { 3 } else { 0 };
+    format!("{:.digits$} [{:.digits$}, {:.digits$}]", e.value, e.low, e.high)
+}
+
+fn percent(share: f64) -> String {
+    if share.is_finite() { format!("{:.0} %", 100.0 * share) } else { "not stated".to_owned() }
 }

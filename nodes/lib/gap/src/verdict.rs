@@ -2,69 +2,23 @@
 
 use std::collections::BTreeMap;
 
+use crate::budget::Budget;
 use crate::effects::EffectId;
 use crate::engine::State;
-use crate::evaluate::{Estimate, bootstrap, mean};
+use crate::evaluate::mean;
 use crate::model::BASE;
 use crate::outcome::{EffectParameter, RankedEffect, Verdict};
 use crate::select::{Round, thresholds};
 
-/// Errors of the models on the scored blocks.
-#[derive(Debug, Clone)]
-pub(crate) struct Budget {
-    pub(crate) nominal: Vec<(f64, f64)>,
-    /// Retuned tires, then with one effect after the other.
-    pub(crate) steps: Vec<Vec<(f64, f64)>>,
-    pub(crate) ceiling: Vec<(f64, f64)>,
-    pub(crate) floor: Estimate,
-    pub(crate) closed: Estimate,
-    pub(crate) scored_on: &'static str,
-}
-
 /// Excess of the retuned model over the noise below which there is no gap to explain: slow sensor noise and the background that any real car
 /// has against a single-track model.
 const SMALL_EXCESS: f64 = 0.3;
+/// Held-out error of the retuned over that of the nominal model from which it is worth a word.
+const WORSE: f64 = 1.2;
 /// Share of what could be explained at all that the named effects must explain.
 const LEAST_EXPLAINED: f64 = 0.5;
 /// Excess of the nominal over the retuned model that makes it a retune.
 const RETUNE_EXCESS: f64 = 0.1;
-
-impl Budget {
-    pub(crate) fn new(
-        nominal: Vec<(f64, f64)>,
-        steps: Vec<Vec<(f64, f64)>>,
-        ceiling: Vec<(f64, f64)>,
-        scored_on: &'static str,
-    ) -> Self {
-        // By construction of the noise's figure the floor is 1; how well that figure is known shows in nothing here but the white part.
-        let floor = Estimate { value: 1.0, low: 1.0, high: 1.0 };
-        let closed = match (steps.first(), steps.last()) {
-            (Some(first), Some(last)) if steps.len() > 1 => closed(first, last, first),
-            _ => Estimate::default(),
-        };
-        Self { nominal, steps, ceiling, floor, closed, scored_on }
-    }
-
-    fn retuned(&self) -> f64 {
-        self.steps.first().map_or(f64::NAN, |b| mean(b))
-    }
-
-    fn after(&self) -> f64 {
-        self.steps.last().map_or(f64::NAN, |b| mean(b))
-    }
-}
-
-/// (from - to)/(retuned - floor), with its interval over blocks.
-fn closed(from: &[(f64, f64)], to: &[(f64, f64)], retuned: &[(f64, f64)]) -> Estimate {
-    let at = |blocks: &[(f64, f64)], picked: &[usize]| {
-        let (s, n) = picked.iter().fold((0.0, 0.0), |(s, n), &i| (s + blocks[i].0, n + blocks[i].1));
-        s / f64::max(n, 1.0)
-    };
-    bootstrap(retuned.len(), |picked| {
-        let whole = (at(retuned, picked) - 1.0).max(1e-3);
-        (at(from, picked) - at(to, picked)) / whole
-    })
-}
 
 /// The verdict, with its reasons.
 pub(crate) fn decide(
@@ -78,6 +32,9 @@ pub(crate) fn decide(
     let mut reasons = vec![format!(
         "mean squared rollout error over noise: {nominal:.2} nominal, {retuned:.2} with retuned tires, {after:.2} with the effects, {ceiling:.2} with flexible terms, 1 is noise"
     )];
+    if retuned > WORSE * nominal {
+        reasons.push("the tires fitted to the training blocks do worse on the held-out ones than those handed over: the drive is not alike throughout".to_owned());
+    }
     let weighted = rounds.last().map_or(f64::INFINITY, |r| r.before.cost / r.before.residuals());
     let small = weighted < thresholds::SMALL_COST;
     let excess = retuned - 1.0;
@@ -131,10 +88,7 @@ pub(crate) fn rank(rounds: &[Round], state: &State, budget: &Budget) -> Vec<Rank
             continue;
         }
         step += 1;
-        let fraction = match (budget.steps.get(step - 1), budget.steps.get(step), budget.steps.first()) {
-            (Some(from), Some(to), Some(retuned)) => closed(from, to, retuned),
-            _ => Estimate::default(),
-        };
+        let fraction = budget.closed_by_step(step);
         let confused = confused(round);
         out.push(RankedEffect {
             name: best.effect.name(),
@@ -145,23 +99,26 @@ pub(crate) fn rank(rounds: &[Round], state: &State, budget: &Budget) -> Vec<Rank
             confused_with: confused.iter().map(|e| e.name()).collect(),
         });
     }
-    let Some(last) = rounds.iter().rev().find(|r| r.taken.is_none()).or(rounds.first()) else { return out };
-    let remaining = (last.before.cost).max(1e-9);
+    let Some(last) = last_look(rounds) else { return out };
     for r in &last.refits {
         if out.iter().any(|e| e.name == r.effect.name()) {
             continue;
         }
-        let share = (r.gain / remaining).clamp(0.0, 1.0);
         out.push(RankedEffect {
             name: r.effect.name(),
             accepted: false,
             parameters: parameters(&r.state, r.effect),
-            gap_closed_fraction: Estimate { value: share, low: share, high: share },
+            gap_closed_fraction: budget.closed_by_candidate(r.effect),
             confidence: 0.0,
             confused_with: Vec::new(),
         });
     }
     out
+}
+
+/// The round whose candidates were not taken; else the first.
+pub(crate) fn last_look(rounds: &[Round]) -> Option<&Round> {
+    rounds.iter().rev().find(|r| r.taken.is_none()).or(rounds.first())
 }
 
 /// What a round cannot tell from its winner.

@@ -294,4 +294,17 @@ mod tests {
         assert_eq!(EffectId::by_name("magic"), None);
         assert_eq!(EffectId::ALL.len(), 34);
     }
+
+    #[test]
+    fn stated_sizes_have_the_documented_sign_and_no_limit_is_no_number() {
+        let stated = |effect: EffectId, p: &[f64]| (effect.spec().reported[0].value)(p);
+        // Wherever on the lap it climbs, uphill is positive.
+        for p in [[0.0, 0.03, 0.0], [-1e-4, -0.03, 0.0], [1e-4, 0.0, -0.03]] {
+            approx::assert_relative_eq!(stated(EffectId::RoadSlope, &p), 0.03, epsilon = 2e-4);
+        }
+        assert!(stated(EffectId::RoadSlope, &[-0.02, 0.0, 0.0]) < 0.0);
+        assert!(stated(EffectId::RoadBank, &[-0.03, 0.02, 0.0]) < -0.04);
+        assert_eq!(stated(EffectId::SteeringRateLimit, &[0.0]), f64::INFINITY);
+        approx::assert_relative_eq!(stated(EffectId::SteeringRateLimit, &[2.0]), 0.5);
+    }
 }

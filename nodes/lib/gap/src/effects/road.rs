@@ -23,7 +23,10 @@ fn extreme(p: &[f64]) -> f64 {
     if p[0] < 0.0 { p[0] - wave } else { p[0] + wave }
 }
 
-const REPORTED: &[Reported] = &[Reported { name: "angle_rad", unit: "rad", value: extreme }];
+/// The steepest climb. A lap that ends where it began climbs as much as it falls: of the two the climb is stated.
+fn climb(p: &[f64]) -> f64 {
+    p[0] + p[1].hypot(p[2])
+}
 
 /// The road leans to one side.
 #[derive(Debug)]
@@ -31,7 +34,7 @@ pub(super) struct RoadBank;
 
 impl Effect for RoadBank {
     const SPEC: EffectSpec = EffectSpec {
-        reported: REPORTED,
+        reported: &[Reported { name: "angle_rad", unit: "rad", value: extreme }],
         ..spec(
             "road_bank",
             "v_y' -= g sin(angle); F_z from g cos(angle) - v r sin(angle); positive: left side high",
@@ -65,7 +68,7 @@ pub(super) struct RoadSlope;
 impl Effect for RoadSlope {
     const SPEC: EffectSpec = EffectSpec {
         needs: COMMAND,
-        reported: REPORTED,
+        reported: &[Reported { name: "angle_rad", unit: "rad", value: climb }],
         ..spec(
             "road_slope",
             "v_x' -= g sin(angle); positive: uphill",

@@ -125,13 +125,18 @@ impl Effect for SteeringBacklash {
     }
 }
 
+/// The limit of an inverse rate: infinite, in files `null`, where there is none.
+fn rate_radps(s_per_rad: f64) -> f64 {
+    if s_per_rad > 1e-6 { 1.0 / s_per_rad } else { f64::INFINITY }
+}
+
 /// The steering is not faster than a rate. Fitted as its inverse, so that "no limit" is 0.
 #[derive(Debug)]
 pub(super) struct SteeringRateLimit;
 
 impl Effect for SteeringRateLimit {
     const SPEC: EffectSpec = EffectSpec {
-        reported: &[Reported { name: "rate_radps", unit: "rad/s", value: |p| 1.0 / p[0].max(1e-9) }],
+        reported: &[Reported { name: "rate_radps", unit: "rad/s", value: |p| rate_radps(p[0]) }],
         starts: &[1.0, 2.0, 3.5],
         flat_at_null: true,
         ..spec(

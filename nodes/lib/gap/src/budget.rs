@@ -1,0 +1,222 @@
+//! How large the gap is, step by step, on data that no model was fitted to.
+
+use std::collections::BTreeMap;
+
+use crate::effects::EffectId;
+use crate::engine::{Engine, State};
+use crate::evaluate::{Estimate, bootstrap, by_block, interval, mean, of_picked};
+use crate::flexible::Flexible;
+use crate::outcome::GapBudget;
+use crate::recording::Recording;
+use crate::select::Round;
+use crate::verdict::last_look;
+use crate::windows::{HORIZON_S, Split, Windows, of_length, split};
+
+/// Errors of the models on the scored blocks.
+#[derive(Debug, Clone)]
+pub(crate) struct Budget {
+    pub(crate) nominal: Vec<(f64, f64)>,
+    /// Retuned tires, then with one effect after the other.
+    pub(crate) steps: Vec<Vec<(f64, f64)>>,
+    pub(crate) ceiling: Vec<(f64, f64)>,
+    pub(crate) floor: Estimate,
+    pub(crate) closed: Estimate,
+    pub(crate) scored_on: &'static str,
+    /// What the best of the effects that were not taken would close.
+    candidates: Vec<(EffectId, Estimate)>,
+    instead: bool,
+}
+
+/// The models that are scored.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Models<'m> {
+    /// Parameters as they came.
+    pub(crate) nominal: &'m [f64],
+    /// Tires retuned.
+    pub(crate) null: &'m State,
+    /// With the effects taken.
+    pub(crate) state: &'m State,
+    /// How they were found.
+    pub(crate) rounds: &'m [Round],
+    /// Whether the effect stands in place of a retune.
+    pub(crate) instead: bool,
+}
+
+/// Iterations of the fits of the steps between.
+const STEP_ITERATIONS: usize = 10;
+/// How many of the effects that were not taken are scored, and the iterations of their fits.
+const CANDIDATES: usize = 3;
+const CANDIDATE_ITERATIONS: usize = 5;
+/// An interval of a share that is wider says nothing.
+const WIDEST_SHARE: f64 = 2.0;
+
+impl Budget {
+    /// Scores the models on the held-out blocks, or on another bag.
+    pub(crate) fn of(
+        engine: &Engine<'_>,
+        other: Option<&Recording>,
+        windows: &Split,
+        models: &Models<'_>,
+    ) -> Self {
+        let Models { nominal, null, state, rounds, instead } = *models;
+        // The other bag has its own noise; models and weights are those fitted here.
+        let foreign = other.map(|r| (Engine { recording: r, ..engine.clone() }, split(r, false)));
+        let (scorer, on, scored_on): (&Engine<'_>, Windows, _) = match &foreign {
+            Some((e, s)) => (e, of_length(e.recording, &s.training, HORIZON_S), "another bag"),
+            None if windows.held_out.windows.is_empty() => (
+                engine,
+                of_length(engine.recording, &windows.training, HORIZON_S),
+                "training blocks (too little data to hold any out)",
+            ),
+            None => (engine, windows.held_out.clone(), "held-out blocks"),
+        };
+        let blocks = |effects: &[EffectId], flexible: Option<&Flexible>, p: &[f64]| {
+            by_block(scorer.recording, &on, &scorer.score(effects, flexible, p, &on))
+        };
+        let retuned = blocks(&[], None, &null.parameters);
+        let mut steps = vec![retuned.clone()];
+        let mut so_far = Vec::new();
+        for best in rounds.iter().filter_map(|r| r.taken.and_then(|i| r.refits.get(i))) {
+            so_far.push(best.effect);
+            if so_far.len() < state.effects.len() {
+                let values = &best.state.parameters;
+                let step = engine.fit(&so_far, values, None, &windows.training, STEP_ITERATIONS);
+                steps.push(blocks(&so_far, None, &step.parameters));
+            }
+        }
+        if !state.effects.is_empty() {
+            steps.push(blocks(&state.effects, None, &state.parameters));
+        }
+        let candidates = last_look(rounds).map_or_else(Vec::new, |round| {
+            let left = round.refits.iter().filter(|r| !state.effects.contains(&r.effect));
+            left.take(CANDIDATES)
+                .filter_map(|r| {
+                    let (effects, values) = (&r.state.effects, &r.state.parameters);
+                    let from = steps.get(effects.len().checked_sub(1)?)?;
+                    let fitted = engine.fit(effects, values, None, &windows.training, CANDIDATE_ITERATIONS);
+                    Some((r.effect, closed(from, &blocks(effects, None, &fitted.parameters), &retuned)))
+                })
+                .collect()
+        });
+        let slip = large_slip_rad(engine, null, &windows.training);
+        let flexible = Flexible::new(engine.recording, slip, engine.vehicle.wheelbase_m());
+        let ceiling = engine.fit_flexible(state, &flexible, &windows.training);
+        let whole = match steps.last() {
+            Some(_) if instead => Estimate::UNKNOWN,
+            Some(last) if steps.len() > 1 => closed(&retuned, last, &retuned),
+            _ => Estimate::default(),
+        };
+        Self {
+            nominal: blocks(&[], None, nominal),
+            ceiling: blocks(&state.effects, Some(&flexible), &ceiling),
+            steps,
+            // By construction of the noise's figure the floor is 1.
+            floor: Estimate { value: 1.0, low: 1.0, high: 1.0 },
+            closed: whole,
+            scored_on,
+            candidates,
+            instead,
+        }
+    }
+
+    pub(crate) fn retuned(&self) -> f64 {
+        self.steps.first().map_or(f64::NAN, |b| mean(b))
+    }
+
+    pub(crate) fn after(&self) -> f64 {
+        self.steps.last().map_or(f64::NAN, |b| mean(b))
+    }
+
+    /// What the effect taken as number `step`, from 1, closes after those before it.
+    pub(crate) fn closed_by_step(&self, step: usize) -> Estimate {
+        match (self.steps.get(step - 1), self.steps.get(step), self.steps.first()) {
+            (Some(from), Some(to), Some(retuned)) if !self.instead => closed(from, to, retuned),
+            _ => Estimate::UNKNOWN,
+        }
+    }
+
+    /// What an effect that was not taken would close on top of those that were.
+    pub(crate) fn closed_by_candidate(&self, effect: EffectId) -> Estimate {
+        self.candidates.iter().find(|c| c.0 == effect && !self.instead).map_or(Estimate::UNKNOWN, |c| c.1)
+    }
+
+    /// As the result states it.
+    pub(crate) fn stated(&self, recording: &Recording) -> GapBudget {
+        let channel_noise: BTreeMap<&'static str, f64> = recording
+            .channels
+            .iter()
+            .zip(&recording.sigma)
+            .filter(|(c, _)| c.scored())
+            .map(|(c, s)| (c.name(), *s))
+            .collect();
+        let after = self.steps.last().map_or(Estimate::UNKNOWN, |b| interval(b));
+        let ceiling = interval(&self.ceiling);
+        GapBudget {
+            nominal: interval(&self.nominal),
+            retuned: self.steps.first().map_or(Estimate::UNKNOWN, |b| interval(b)),
+            after,
+            unstructured_ceiling: if ceiling.value > after.value { after } else { ceiling },
+            noise_floor: self.floor,
+            horizon_s: HORIZON_S,
+            channel_noise,
+            scored_on: self.scored_on,
+        }
+    }
+}
+
+/// (from - to)/(retuned - floor), with its interval over blocks; unknown where the gap's own interval reaches down to the noise, or
+/// the share's is wider than twice the gap.
+fn closed(from: &[(f64, f64)], to: &[(f64, f64)], retuned: &[(f64, f64)]) -> Estimate {
+    let gap = bootstrap(retuned.len(), |picked| of_picked(retuned, picked) - 1.0);
+    if gap.low.is_nan() || gap.low <= 0.0 {
+        return Estimate::UNKNOWN;
+    }
+    let share = bootstrap(retuned.len(), |picked| {
+        let whole = (of_picked(retuned, picked) - 1.0).max(1e-3);
+        (of_picked(from, picked) - of_picked(to, picked)) / whole
+    });
+    if share.high - share.low <= WIDEST_SHARE { share } else { Estimate::UNKNOWN }
+}
+
+/// A large slip angle of the recording on the fitted tires.
+fn large_slip_rad(engine: &Engine<'_>, null: &State, windows: &Windows) -> f64 {
+    let car = gripsight_vehicle::SingleTrack::new(engine.vehicle, &null.tires());
+    let mut slips = Vec::new();
+    for w in &windows.windows {
+        let run = &engine.recording.runs[w.segment];
+        for k in (w.from..w.from + w.len).step_by(5) {
+            let state =
+                gripsight_vehicle::State { v_y_mps: run.smooth[0][k], yaw_rate_radps: run.smooth[1][k] };
+            let input =
+                gripsight_vehicle::Input { v_x_mps: run.v_x_mps[k], steering_rad: run.steering_rad[k] };
+            let (f, r) = car.slip_angles_rad(&state, &input);
+            slips.push(f.abs().max(r.abs()));
+        }
+    }
+    crate::smooth::quantile(slips, 0.8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn blocks(means: &[f64]) -> Vec<(f64, f64)> {
+        means.iter().map(|m| (100.0 * m, 100.0)).collect()
+    }
+
+    #[test]
+    fn a_share_is_stated_only_of_a_gap_that_is_clear() {
+        let retuned = blocks(&[9.0, 11.0, 10.0, 12.0, 8.0, 10.0]);
+        let after = blocks(&[2.8, 3.2, 3.0, 3.1, 2.9, 3.0]);
+        let clear = closed(&retuned, &after, &retuned);
+        approx::assert_relative_eq!(clear.value, 7.0 / 9.0, epsilon = 1e-12);
+        assert!(clear.low < clear.value && clear.value < clear.high && clear.high < 1.0);
+        // No gap, a gap that sits in one block, and a model that runs off in one block.
+        let none = blocks(&[0.9, 1.1, 1.0, 1.05, 0.95, 1.0]);
+        let one_place = blocks(&[1.0, 1.0, 1.0, 1.0, 1.0, 90.0]);
+        let runs_off = blocks(&[3.0, 3.0, 3.0, 3.0, 3.0, 500.0]);
+        for (to, whole) in [(&none, &none), (&after, &one_place), (&runs_off, &retuned)] {
+            assert!(closed(whole, to, whole).value.is_nan());
+        }
+    }
+}
