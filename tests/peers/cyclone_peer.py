@@ -176,4 +176,5 @@ def main():
     sys.exit(0 if work(DomainParticipant(int(os.environ.get("ROS_DOMAIN_ID", 0))), args) else 1)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -3,5 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
 mod bag_player;
+mod camera_prior;
 mod identification;
 mod runtime;
+mod sim_car;

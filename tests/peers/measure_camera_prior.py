@@ -1,0 +1,129 @@
+"""Measures the node camera_prior against a CycloneDDS publisher: CPU a frame, latency from stamp to prior, frames dropped.
+
+    measure_camera_prior.py BINARY PICTURE (raw|jpeg) [--frames 300] [--rate 30]
+
+PICTURE is a usable road picture of 1280x720, a binary PPM (P6) for raw, else a JPEG. Every frame
+differs in one byte (raw) or in bytes behind the end marker (JPEG), as a live camera's frames do. CPU: user and system time of
+the node's process between the first and the last frame, from /proc, over the frames sent; it includes receiving them. A
+prior carries its picture's stamp, so frames that yield no prior are counted as lost or dropped; the node's diagnostics say
+which. Latency: this process's clock at the stamp and at the arrival of the prior, so the publisher's own writing time counts.
+"""
+
+import argparse
+import os
+import pathlib
+import statistics
+import struct as binary
+import subprocess
+import threading
+import time
+
+from cyclone_peer import build, qos, struct
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+
+WIDTH, HEIGHT = 1280, 720
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+def pixels(path):
+    """The pixels of a P6 file without comments."""
+    magic, width, height, levels, data = path.read_bytes().split(maxsplit=4)
+    assert (magic, int(width), int(height), levels) == (b"P6", WIDTH, HEIGHT, b"255"), path
+    return data
+
+
+def message(form, path):
+    """A kind of message, its topic and its serialised form; the stamp is at byte 4."""
+    header = {"frame_id": "camera"}
+    if form == "raw":
+        kind, data = struct("sensor_msgs", "Image"), pixels(path)
+        sample = {"header": header, "height": HEIGHT, "width": WIDTH, "encoding": "rgb8", "step": 3 * WIDTH}
+        topic = "rt/image"
+    else:
+        kind, data = struct("sensor_msgs", "CompressedImage"), path.read_bytes() + bytes(4)
+        sample, topic = {"header": header, "format": "jpeg"}, "rt/image/compressed"
+    head = build(kind, sample).serialize()
+    # The empty sequence's length is the last word: the bytes follow it.
+    return kind, topic, bytearray(head[:-4] + binary.pack("<I", len(data)) + data)
+
+
+def cpu_s(pid):
+    fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def percentile(values, share):
+    return sorted(values)[min(len(values) - 1, int(share * len(values)))]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("binary")
+    parser.add_argument("picture", type=pathlib.Path)
+    parser.add_argument("form", choices=["raw", "jpeg"])
+    parser.add_argument("--frames", type=int, default=300)
+    parser.add_argument("--rate", type=float, default=30.0)
+    args = parser.parse_args()
+    model = ROOT / "nodes/camera_prior/model/road_mobilenet_v3_small.onnx"
+    library = ROOT / ".deps/onnxruntime/libonnxruntime.so"
+    settings = {"input": "raw" if args.form == "raw" else "compressed", "model": model, "onnxruntime_library": library}
+    parameters = [part for name, value in settings.items() for part in ("-p", f"{name}:={value}")]
+    node = subprocess.Popen([args.binary, "--ros-args", *parameters], stderr=subprocess.DEVNULL)
+    participant = DomainParticipant(int(os.environ.get("ROS_DOMAIN_ID", 0)))
+    kind, topic, frame = message(args.form, args.picture)
+    kind.serialize = lambda self, **_: bytes(frame)
+    writer = DataWriter(participant, Topic(participant, topic, kind), qos("sensor"))
+    prior = struct("gripsight_msgs", "FrictionPrior")
+    reader = DataReader(participant, Topic(participant, "rt/camera_prior/friction", prior), qos("reliable"))
+    sample, sent, heard, running = build(kind, None), {}, {}, True
+
+    def listen():
+        while running:
+            for got in reader.take(N=50):
+                heard.setdefault((got.header.stamp.sec, got.header.stamp.nanosec), (time.time(), got))
+            time.sleep(0.0005)
+
+    try:
+        while not (writer.get_matched_subscriptions() and reader.get_matched_publications()):
+            time.sleep(0.05)
+        listener = threading.Thread(target=listen)
+        listener.start()
+        time.sleep(1.5)
+        before, idle = cpu_s(node.pid), time.monotonic()
+        time.sleep(2.0)
+        idle = (cpu_s(node.pid) - before) / (time.monotonic() - idle)
+        warm, start = 15, time.monotonic()
+        for index in range(warm + args.frames):
+            time.sleep(max(0.0, start + index / args.rate - time.monotonic()))
+            if index == warm:
+                cpu, busy = cpu_s(node.pid), time.monotonic()
+            now = time.time()
+            stamp = (int(now), int(now % 1 * 1e9))
+            binary.pack_into("<iI", frame, 4, *stamp)
+            frame[-1 - 3 * (index % 7)] ^= 1 + index % 3
+            if index >= warm:
+                sent[stamp] = now
+            writer.write(sample)
+        time.sleep(1.0 / args.rate)
+        cpu, busy = cpu_s(node.pid) - cpu, time.monotonic() - busy
+        time.sleep(1.0)
+    finally:
+        running = False
+        node.terminate()
+    node.wait()
+    answered = [(heard[stamp][0] - now, heard[stamp][1]) for stamp, now in sent.items() if stamp in heard]
+    reasons = sorted({got.reason for _, got in answered if not got.valid})
+    latency_ms = [1e3 * seconds for seconds, _ in answered]
+    print(f"{args.form} {WIDTH}x{HEIGHT}, {len(frame)} bytes a message, {len(sent)} frames in {busy:.2f} s")
+    print(f"priors {len(answered)}, of them valid {sum(got.valid for _, got in answered)} {reasons}, without a prior {len(sent) - len(answered)}")
+    print(f"CPU of the node: {1e3 * cpu / len(sent):.2f} ms a frame sent; without pictures {1e3 * idle:.1f} ms a second")
+    if latency_ms:
+        p50, p99 = percentile(latency_ms, 0.5), percentile(latency_ms, 0.99)
+        print(f"latency stamp to prior: p50 {p50:.2f} ms, p99 {p99:.2f} ms, most {max(latency_ms):.2f} ms, mean {statistics.mean(latency_ms):.2f} ms")
+
+
+if __name__ == "__main__":
+    main()

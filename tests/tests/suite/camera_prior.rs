@@ -1,0 +1,132 @@
+//! The camera prior on topics: what a peer hears from it, and what its pictures do.
+
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use gripsight_msgs::standard::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
+use gripsight_msgs::standard::sensor_msgs::CompressedImage;
+use gripsight_msgs::{FrictionPrior, Message};
+use gripsight_tests::domain::Domain;
+use gripsight_tests::peers::{PATIENCE, available, cyclone, message, start_cyclone};
+use gripsight_tests::process::{Process, node};
+use serde_json::json;
+
+const FRICTION: &str = "/camera_prior/friction";
+
+fn listen(domain: &Domain, python: &Path, topic: &str, kind: &str, qos: &str) -> Process {
+    start_cyclone(domain, python, &["subscribe", topic, kind, "--qos", qos, "--count", "1000"])
+}
+
+/// The first prior that `wanted` holds of. Others come before it: once a second there is one without a picture.
+fn prior(peer: &Process, wanted: impl Fn(&FrictionPrior) -> bool) -> FrictionPrior {
+    (0..30).map(|_| message::<FrictionPrior>(peer)).find(wanted).unwrap()
+}
+
+fn in_tree(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
+}
+
+/// Where engine and network are. None, said plainly, where the library was not fetched.
+fn engine() -> Option<[String; 2]> {
+    let library = in_tree(".deps/onnxruntime/libonnxruntime.so");
+    if !library.exists() {
+        eprintln!("SKIPPED: no ONNX Runtime; run launch_scripts/fetch_onnxruntime.sh");
+        return None;
+    }
+    let model = in_tree("nodes/camera_prior/model/road_mobilenet_v3_small.onnx");
+    Some([format!("onnxruntime_library:={}", library.display()), format!("model:={}", model.display())])
+}
+
+#[test]
+fn a_configured_prior_reaches_a_late_peer() {
+    let Ok(python) = cyclone() else {
+        available(&[cyclone()]);
+        return;
+    };
+    let domain = Domain::new();
+    // As launch_scripts/run_suite.sh starts it.
+    let _node = node(&domain, "camera_prior", &["-p", "input:=none", "-p", "configured_mu:=0.72"]);
+    let early = listen(&domain, &python, FRICTION, FrictionPrior::TYPE, "latched");
+    let told: FrictionPrior = message(&early);
+    let late = listen(&domain, &python, FRICTION, FrictionPrior::TYPE, "latched");
+    for told in [told, message(&late)] {
+        assert!(told.valid, "{told:?}");
+        assert_eq!((told.source, told.mu, told.reason.as_str()), (FrictionPrior::CONFIGURED, 0.72, ""));
+        assert!(told.sigma > 0.0 && told.pictures == 0, "{told:?}");
+    }
+}
+
+/// A road picture as a JPEG.
+fn road() -> Vec<u8> {
+    let picture = image::open(in_tree("nodes/lib/friction/tests/golden/road.png")).unwrap().to_rgb8();
+    let mut jpeg = Cursor::new(vec![]);
+    picture.write_to(&mut jpeg, image::ImageFormat::Jpeg).unwrap();
+    jpeg.into_inner()
+}
+
+/// A picture message as a JSON line, stamped `later_s` from now.
+fn line(data: &[u8], later_s: u64) -> String {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
+    let stamp = json!({"sec": now.as_secs() + later_s, "nanosec": now.subsec_nanos()});
+    let header = json!({"stamp": stamp, "frame_id": "camera"});
+    json!({"header": header, "format": "jpeg", "data": data}).to_string() + "\n"
+}
+
+#[test]
+fn a_peer_s_pictures_are_read_and_broken_ones_refused() {
+    let Ok(python) = cyclone() else {
+        available(&[cyclone()]);
+        return;
+    };
+    let Some([library, model]) = engine() else { return };
+    let domain = Domain::new();
+    let listener = listen(&domain, &python, FRICTION, FrictionPrior::TYPE, "reliable");
+    // The peer starts to send once it has found the node, so its stamps may be old, and the second is ahead by one.
+    let age = ["-p", "most_age_s:=60.0", "-p", "most_ahead_s:=5.0"];
+    let files = ["-p", &library, "-p", &model];
+    let _node = node(&domain, "camera_prior", &[&age[..], &files].concat());
+    let topic = ["publish", "/image/compressed", CompressedImage::TYPE, "--qos", "sensor", "--period", "1"];
+    let mut peer = start_cyclone(&domain, &python, &topic);
+    let jpeg = road();
+    peer.feed(&(line(&jpeg, 0) + &line(&jpeg[..jpeg.len() / 2], 1)));
+
+    let read = prior(&listener, |p| p.reason != "no_picture");
+    assert!(read.valid, "{read:?}");
+    assert_eq!(
+        (read.source, read.pictures, read.header.frame_id.as_str()),
+        (FrictionPrior::CAMERA, 1, "camera")
+    );
+    let expected: f64 = read.probability.iter().zip(&read.class_mu).map(|(p, mu)| p * mu).sum();
+    assert!((read.mu - expected).abs() < 1e-9 && read.sigma > 0.0, "{read:?}");
+
+    let refused = prior(&listener, |p| p.reason != "no_picture");
+    assert!(!refused.valid, "{refused:?}");
+    assert_eq!((refused.reason.as_str(), refused.source), ("undecodable", FrictionPrior::CAMERA));
+    assert!(refused.sigma > read.sigma, "{refused:?}");
+    assert!(peer.wait(PATIENCE).success());
+}
+
+#[test]
+fn without_its_model_the_node_runs_on_and_says_so() {
+    let Ok(python) = cyclone() else {
+        available(&[cyclone()]);
+        return;
+    };
+    let domain = Domain::new();
+    let listener = listen(&domain, &python, FRICTION, FrictionPrior::TYPE, "reliable");
+    let diagnostics = listen(&domain, &python, "/diagnostics", DiagnosticArray::TYPE, "reliable");
+    let library = engine().map_or_else(|| "onnxruntime_library:=none.so".to_owned(), |[library, _]| library);
+    let arguments = ["-p", &library, "-p", "model:=none.onnx", "-p", "configured_mu:=0.72"];
+    let _node = node(&domain, "camera_prior", &arguments);
+    let status: DiagnosticStatus = (0..30)
+        .flat_map(|_| message::<DiagnosticArray>(&diagnostics).status)
+        .find(|status| status.name == "camera_prior: camera")
+        .unwrap();
+    assert_eq!(status.level, DiagnosticStatus::ERROR, "{status:?}");
+    assert!(status.message.contains("none."), "{status:?}");
+    for _ in 0..3 {
+        let told: FrictionPrior = message(&listener);
+        assert_eq!((told.valid, told.source, told.mu), (true, FrictionPrior::CONFIGURED, 0.72));
+    }
+}
