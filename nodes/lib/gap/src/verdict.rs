@@ -33,7 +33,7 @@ pub(crate) fn decide(
         "mean squared rollout error over noise: {nominal:.2} nominal, {retuned:.2} with retuned tires, {after:.2} with the effects, {ceiling:.2} with flexible terms, 1 is noise"
     )];
     if retuned > WORSE * nominal {
-        reasons.push("the tires fitted to the training blocks do worse on the held-out ones than those handed over: the drive is not alike throughout".to_owned());
+        reasons.push("the tires fitted to the training blocks do worse on the held-out ones than the nominal tires: the drive is not alike throughout".to_owned());
     }
     let weighted = rounds.last().map_or(f64::INFINITY, |r| r.before.cost / r.before.residuals());
     let small = weighted < thresholds::SMALL_COST;
