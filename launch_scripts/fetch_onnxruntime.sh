@@ -2,8 +2,10 @@
 # Fetches the ONNX Runtime library (MIT, 24 MB) that the camera prior loads, into .deps/onnxruntime at the root of this
 # tree, where the programs find it without any variable. Run it again at will: what is there and whole is kept.
 #
-#   launch_scripts/fetch_onnxruntime.sh [x86_64|aarch64]      needs python3 with pip, sha256sum
+#   launch_scripts/fetch_onnxruntime.sh [x86_64|aarch64]      needs a Python with pip ($PYTHON, else python3), sha256sum
 set -euo pipefail
+
+python=${PYTHON:-python3}
 
 version=1.31.1
 machine=${1:-$(uname -m)}
@@ -25,14 +27,14 @@ fi
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-python3 -m pip download --quiet --no-deps --only-binary=:all: --python-version 3.11 \
+"$python" -m pip download --quiet --no-deps --only-binary=:all: --python-version 3.11 \
   --platform "manylinux_2_28_$machine" --dest "$work" "onnxruntime==$version"
 wheel=$(echo "$work"/onnxruntime-*.whl)
 echo "$wheel_sha256  $wheel" | sha256sum --check --status || {
   echo "the wheel's hash is $(sha256sum "$wheel" | cut -d' ' -f1), expected $wheel_sha256: not installed" >&2
   exit 1
 }
-python3 - "$wheel" "$work" <<'PYTHON'
+"$python" - "$wheel" "$work" <<'PYTHON'
 import sys, zipfile
 wheel, work = sys.argv[1:]
 with zipfile.ZipFile(wheel) as archive:

@@ -9,7 +9,7 @@ Usage: launch_scripts/setup.sh [--tests] [--dry-run]
 Sets up, inside the project's folder as far as possible:
   system packages   launch_scripts/apt_packages.txt; without root they are unpacked into .deps/system
   ONNX Runtime      .deps/onnxruntime, from a pinned and hash-checked wheel (for the camera prior)
-  Python tools      .venv, tests/requirements.txt (DDS peers and bag readers; only with --tests)
+  Python tools      .venv; with --tests the DDS peers and bag readers of tests/requirements.txt
 
   --tests     also what the tests need
   --dry-run   say what would be done, do nothing
@@ -80,22 +80,27 @@ fi
 # --- Python tools ----------------------------------------------------------------------------------------------------
 python=${PYTHON:-python3}
 make_venv() {
-    if [[ -x .venv/bin/python ]]; then return; fi
-    "$python" -m venv .venv || { say "'$python -m venv' failed: is python3-venv installed?"; exit 1; }
+    if [[ -x .venv/bin/pip ]]; then return; fi
+    rm -rf .venv
+    if "$python" -m venv .venv >/dev/null 2>&1; then return; fi
+    # Without root python3-venv is only unpacked: its wheel of pip fills an environment made without.
+    local wheel
+    wheel=$(compgen -G '.deps/system/usr/share/python-wheels/pip-*.whl' | tail -n 1) || true
+    if [[ -z $wheel ]]; then say "'$python -m venv' failed: install python3-venv"; exit 1; fi
+    "$python" -m venv --without-pip .venv
+    .venv/bin/python "$wheel/pip" install -q --disable-pip-version-check pip >&2
 }
-if $with_tests; then
-    if $dry_run; then
-        say "would make .venv and install tests/requirements.txt"
-    elif [[ -f .venv/requirements.txt ]] && diff -q tests/requirements.txt .venv/requirements.txt >/dev/null; then
-        say "Python tools: all there"
-    else
-        say "installing Python tools into .venv"
-        make_venv
-        .venv/bin/python -m pip install -q --disable-pip-version-check -r tests/requirements.txt >&2
-        cp tests/requirements.txt .venv/requirements.txt
-    fi
+if $dry_run; then
+    say "would make .venv, with tests/requirements.txt for the tests, and run launch_scripts/fetch_onnxruntime.sh"
+    exit 0
+fi
+make_venv
+if $with_tests && ! diff -q tests/requirements.txt .venv/requirements.txt >/dev/null 2>&1; then
+    say "installing the tests' Python tools into .venv"
+    .venv/bin/python -m pip install -q --disable-pip-version-check -r tests/requirements.txt >&2
+    cp tests/requirements.txt .venv/requirements.txt
 fi
 
 # --- ONNX Runtime ----------------------------------------------------------------------------------------------------
-run launch_scripts/fetch_onnxruntime.sh
+PYTHON=.venv/bin/python launch_scripts/fetch_onnxruntime.sh >&2
 say "done"
