@@ -184,9 +184,9 @@ fn main() -> Result<()> {
     let plants_rows =
         plants.iter().map(|run| scored(run, "robust, S4", None, &robust)).collect::<Result<Vec<_>>>()?;
 
-    // The paper's setting: one car, one surface, 30 s; four drives that the settings have not seen.
+    // The paper's setting: one car, one surface, 30 s; four drives, two of which end in a spin after 4.42 s and are refused.
     let paper_runs: Vec<Run> =
-        [50, 52, 54, 56].map(|seed| reference_run("f1tenth", "club", 0.8, 0.95, seed, true)).into();
+        [50, 51, 52, 53].map(|seed| reference_run("f1tenth", "club", 0.8, 0.95, seed, true)).into();
     let paper = |residual| Config { method: Method::Paper, residual, ..Config::default() };
     let loop_only = |residual| Config { residual, direct_start: false, ..Config::default() };
     let with = |residual| Config { residual, ..Config::default() };
@@ -224,7 +224,7 @@ fn main() -> Result<()> {
          Command: `cargo run --release -p gripsight_identification --example results -- FOREIGN_BAGS`\n\
          Machine: {} {}, {} threads, shared with other work: times are upper bounds.\n\n\
          RMSE of F_y/F_z over the whole run, at the plant's own slip angles; the floor is the four-parameter Magic Formula fitted to the plant's true \
-         forces. Reference car: load transfer, relaxation and combined slip on; test seeds 31-42 and 50-56, settings chosen on seeds 21-24. \
+         forces. Reference car: load transfer, relaxation and combined slip on; seeds 31-42 and 50-53; settings chosen on seeds 21-24, but the foreign bags and CarMaker were looked at with their scores while revising: development data. \
          CarMaker: normalised by the static loads of 2033 kg. No truth is read by the product.\n\n\
          ## Plants\n\n{}\n![ratios](plants.svg)\n\n\
          ## The paper's Table II: vision prior (mean of 4 drives, 1:10 car, mu 0.8)\n\n{}\n\

@@ -9,6 +9,9 @@ const NO_WORSE: f64 = 1.02;
 /// Largest scatter of v_y, as a share of the rear slips visited, that tires can be fitted through.
 const V_Y_SHARE: f64 = 0.2;
 
+/// No steering that a driver can race with answers later than this.
+const LONGEST_DELAY_S: f64 = 0.2;
+
 /// Fills in verdict, reasons and advice.
 pub(crate) fn judge(run: &Identification, outcome: &mut Outcome) {
     let mut against = Vec::new();
@@ -86,6 +89,18 @@ pub(crate) fn judge(run: &Identification, outcome: &mut Outcome) {
             "not converged: the last of {} turns changed the curves by {:.1} %",
             outcome.iterations,
             100.0 * outcome.history.last().map_or(f64::NAN, |t| t.change)
+        ));
+    }
+    for (name, value) in &run.direct.signals_on_bound {
+        remarks.push(format!(
+            "{name} is on its bound, {value:.3}: the data do not hold it, or ask for what it cannot be"
+        ));
+    }
+    let delay_s = outcome.signals.steering_delay_s;
+    if delay_s > LONGEST_DELAY_S {
+        remarks.push(format!(
+            "the car answers {delay_s:.2} s after the recorded steering, later than a steering (at most {LONGEST_DELAY_S} s): filtered odometry or clocks \
+             that differ; lever arm and stiffnesses bear what a delay does not explain of it"
         ));
     }
     for weak in &outcome.weak_signals {

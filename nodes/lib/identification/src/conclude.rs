@@ -217,7 +217,11 @@ fn peak_friction(run: &Identification, tires: &PacejkaParameters) -> PerAxle<Pea
 fn signal_intervals(run: &Identification) -> SignalEstimates {
     SignalEstimates::from_array(std::array::from_fn(|j| {
         let value = run.direct.fit.parameters[SIGNALS + j];
-        Estimate::from_error(value, run.direct.signal_errors[j])
+        // Where data and prior contradict each other one of them is wrong: widened by Birge's ratio, as the Particle Data Group does.
+        let prior = run.direct.signal_priors[j];
+        let error = run.direct.signal_errors[j]
+            .map(|e| e * ((value - prior.mean).abs() / prior.sigma.hypot(e)).max(1.0));
+        Estimate::from_error(value, error)
     }))
 }
 

@@ -8,41 +8,31 @@
 //! 3. An axle whose peak the data do not reach gets its D from the friction prior, and step 2 is repeated with it.
 //!
 //! Which is identifiable from what: the yaw rate's bias from the heading alone (fixed then); delay from transients; offset and bias of v_y from driving
-//! straight; gain (against K_f) and lever arm (against K_r) from a range of speeds, and from nothing else. Every one has a prior, [`SIGNAL_PRIORS`].
+//! straight; gain (against K_f) and lever arm (against K_r) from a range of speeds, and from nothing else. Every one has a prior.
 
-use nalgebra::{DMatrix, DVector};
+mod peak;
+mod signals;
+mod weights;
 
 use gripsight_vehicle::{GRAVITY_MPS2, MagicFormula, PacejkaParameters, SingleTrack, VehicleParameters};
 
-use crate::data::{Data, Part, median, quantile};
+use crate::data::{Data, Part, quantile};
 use crate::extract::extract;
 use crate::judge::rollout_errors;
-use crate::rollout::{Nuisance, SIGNALS, TireRollout, corrections_of, nuisance_of, tires_of};
-use crate::shooting::{Fit, Parameter, Prior, Problem, Rollout, StopReason, Window, fit};
+use crate::rollout::{
+    NAMES, Nuisance, PARAMETERS, SIGNALS, TireRollout, corrections_of, nuisance_of, tires_of,
+};
+use crate::shooting::{Fit, Parameter, Prior, Problem, StopReason, Window, fit};
 use crate::sweep::Point;
 use crate::tires::{C_PRIOR, E_PRIOR, parameters};
 use crate::{FrictionPrior, IdentificationError, PerAxle, Range, SignalCorrections};
 
-/// What is likely of the signals before the data are looked at: (mean, sigma, low, high) in the order of [`SignalCorrections`]; the lever
-/// arm in wheelbases, the bias of v_y in mean speeds.
-const SIGNAL_PRIORS: [(f64, f64, f64, f64); 6] = [
-    // Delay: commands reach the wheels after 0 to 0.1 s; a slow car can be driven with 0.4 s.
-    (0.04, 0.1, 0.0, 0.5),
-    // Gain and offset: a servo's calibration.
-    (1.0, 0.03, 0.6, 1.5),
-    (0.0, 0.01, -0.15, 0.15),
-    // Lever arm: the odometry's point is meant to be the centre of gravity, or it is the rear axle (tried as a second start).
-    (0.0, 0.1, -0.8, 0.8),
-    // Bias of v_y: a heading error of half a degree.
-    (0.0, 0.01, -0.1, 0.1),
-    // Gyroscope.
-    (0.0, 0.005, -0.1, 0.1),
-];
+pub(crate) use peak::{PeakEvidence, force_error};
 
-/// Relaxation length in wheelbases: mean, sigma, low, high.
-const RELAXATION_SHARES: [f64; 4] = [0.12, 0.1, 0.005, 0.6];
-/// Share of the friction ellipse: mean, sigma, low, high.
-const COMBINED_SLIP: [f64; 4] = [0.8, 0.3, 0.0, 1.3];
+use peak::evidence;
+use signals::signal_parameters;
+use weights::{Weights, weights};
+
 /// Steering delays that step 1 starts from, s.
 const DELAY_STARTS_S: [f64; 4] = [0.01, 0.06, 0.14, 0.3];
 /// Robustness of the window loss, in noises.
@@ -68,6 +58,8 @@ pub(crate) struct Direct {
     pub(crate) signal_errors: [Option<f64>; 6],
     /// What was held likely of them before the data were looked at.
     pub(crate) signal_priors: [Prior; 6],
+    /// Stiffnesses and corrections that ended on a bound: (name, value).
+    pub(crate) signals_on_bound: Vec<(&'static str, f64)>,
     /// Scatter of v_y and yaw rate about the rollouts.
     pub(crate) scatter: [f64; 2],
     pub(crate) slips: PerAxle<Slips>,
@@ -82,19 +74,6 @@ pub(crate) struct Slips {
     /// 0.5th to 99.5th percentile.
     pub(crate) range_rad: Range,
 }
-
-/// Whether an axle's peak shows in the data.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PeakEvidence {
-    pub(crate) reached: bool,
-}
-
-/// Share of D that the curve has to reach within the slips visited.
-const PEAK_SHARE: f64 = 0.9;
-/// What the stiffness alone would make of the largest slip has to exceed D by this factor: a knee that comes earlier is the model's, not the tire's.
-const PEAK_EXCESS: f64 = 1.6;
-/// Relative standard error of the curve at the largest slip above which the data do not determine it.
-const PEAK_ERROR: f64 = 0.08;
 
 pub(crate) fn direct(
     data: &Data,
@@ -138,10 +117,16 @@ pub(crate) fn direct(
         return Err(IdentificationError::NotFinite { what: "direct fit" });
     }
     // Gain and lever arm that were left at their nominal values may still be off by their priors: their uncertainty is everyone's.
+    // So is that of a correction on a bound: it is not known, only kept from going further.
     let mut open = all.clone();
     restart(&mut open, &found.parameters);
     for j in [GAIN, LEVER] {
         open[j].free = true;
+    }
+    for j in [0, 4].into_iter().chain(SIGNALS..PARAMETERS) {
+        let parameter = &mut open[j];
+        let width = parameter.high - parameter.low;
+        (parameter.low, parameter.high) = (parameter.low - width, parameter.high + width);
     }
     let errors = fitter.solve(&open, &fitter.training, &weights.sigma, 0);
     let (slips, points) = fitter.visited(&found);
@@ -162,6 +147,12 @@ pub(crate) fn direct(
             error => error,
         }),
         signal_priors,
+        signals_on_bound: [0, 4]
+            .into_iter()
+            .chain(SIGNALS..SIGNALS + 6)
+            .filter(|j| found.on_bound.contains(j))
+            .map(|j| (NAMES[j], found.parameters[j]))
+            .collect(),
         fit: errors,
         scatter: weights.scatter,
         slips,
@@ -246,8 +237,8 @@ impl Fitter<'_> {
             found = self.solve(&nominal, &self.training, &weights.sigma, 15);
         }
         let error = |fit: &Fit| -> f64 {
-            // A stiffness on its bound is none.
-            if fit.on_bound.iter().any(|j| [0, 4].contains(j)) {
+            // A stiffness on its bound is none, and a gain or a lever arm there stands for something else.
+            if fit.on_bound.iter().any(|j| [0, 4, GAIN, LEVER].contains(j)) {
                 return f64::MAX;
             }
             let p = std::array::from_fn(|j| fit.parameters[j]);
@@ -326,50 +317,6 @@ fn nearest(
     Ok(extract(&thin, start, hold_d, true)?.axle)
 }
 
-/// The signal parameters with their priors, scaled to the car.
-fn signal_parameters(data: &Data, vehicle: &VehicleParameters) -> Vec<Parameter> {
-    let scales = [1.0, 1.0, 1.0, vehicle.wheelbase_m(), data.mean_speed_mps, 1.0];
-    let mut all: Vec<Parameter> = SIGNAL_PRIORS
-        .iter()
-        .zip(scales)
-        .map(|(&(mean, sigma, low, high), scale)| Parameter {
-            start: mean * scale,
-            low: low * scale,
-            high: high * scale,
-            free: true,
-            prior: Some(Prior { mean: mean * scale, sigma: sigma * scale }),
-        })
-        .collect();
-    if let Some(bias) = yaw_rate_bias(data) {
-        all[5].start = bias.mean.clamp(all[5].low, all[5].high);
-        all[5].prior = Some(bias);
-        all[5].free = false;
-    }
-    let [mean, sigma, low, high] = RELAXATION_SHARES.map(|share| share * vehicle.wheelbase_m());
-    all.push(Parameter { start: mean, low, high, free: true, prior: Some(Prior { mean, sigma }) });
-    let [mean, sigma, low, high] = COMBINED_SLIP;
-    all.push(Parameter { start: mean, low, high, free: true, prior: Some(Prior { mean, sigma }) });
-    all
-}
-
-/// Bias of the yaw rate against the heading, which no tire has a say in; `None` without a pose.
-fn yaw_rate_bias(data: &Data) -> Option<Prior> {
-    // Differences over windows: white noise of the heading averages out.
-    let mut differences: Vec<f64> = Vec::new();
-    for (window, _) in &data.windows {
-        let s = &data.segments[window.segment];
-        let end = window.from + window.len - 1;
-        let turned = s.yaw_rad.get(end)? - s.yaw_rad[window.from];
-        let rate = &s.yaw_rate_radps[window.from..=end];
-        let integral = rate.windows(2).map(|w| 0.5 * (w[0] + w[1])).sum::<f64>() * s.dt_s;
-        differences.push((integral - turned) / ((window.len - 1) as f64 * s.dt_s));
-    }
-    let n = differences.len() as f64;
-    let mean = median(&mut differences)?;
-    let spread = median(&mut differences.iter().map(|d| (d - mean).abs()).collect::<Vec<_>>())? / 0.6745;
-    Some(Prior { mean, sigma: (1.2533 * spread / n.sqrt()).max(1e-4) })
-}
-
 fn restart(all: &mut [Parameter], at: &[f64]) {
     all.iter_mut().zip(at).for_each(|(p, &v)| p.start = v);
 }
@@ -385,67 +332,4 @@ fn low_windows(data: &Data, windows: &[Window], below_mps2: f64) -> Vec<Window> 
         })
         .collect();
     if low.len() < LOW_WINDOWS { windows.to_vec() } else { low }
-}
-
-/// What residuals are divided by: the scatter of each channel about the fit (the median window's root mean square, at least the noise),
-/// times the root of their correlation length. Errors of the model are correlated; counted as independent they would overrule every prior.
-fn weights(model: &TireRollout<'_>, fit: &Fit, windows: &[Window], noise: &[f64; 2]) -> Weights {
-    let (mut predicted, mut measured) = (Vec::new(), Vec::new());
-    let mut squares = [Vec::new(), Vec::new()];
-    let len = windows.first().map_or(0, |w| w.len);
-    let mut covariance = [vec![0.0; len], vec![0.0; len]];
-    for (window, start) in windows.iter().zip(&fit.starts) {
-        model.rollout(&fit.parameters, *start, window, &mut predicted);
-        model.measured(window, &mut measured);
-        for channel in 0..2 {
-            let errors: Vec<f64> =
-                predicted.iter().zip(&measured).skip(channel).step_by(2).map(|(p, m)| p - m).collect();
-            squares[channel].push(errors.iter().map(|e| e * e).sum::<f64>() / window.len as f64);
-            for (lag, sum) in covariance[channel].iter_mut().enumerate() {
-                *sum += errors.iter().zip(&errors[lag..]).map(|(a, b)| a * b).sum::<f64>();
-            }
-        }
-    }
-    let scatter =
-        std::array::from_fn(|c| median(&mut squares[c]).unwrap_or(0.0).sqrt().max(0.5 * noise[c]).max(1e-6));
-    let length = |c: usize| {
-        let rho = covariance[c].iter().skip(1).map(|v| v / covariance[c][0].max(f64::MIN_POSITIVE));
-        1.0 + 2.0 * rho.take_while(|r| *r > 0.0).sum::<f64>()
-    };
-    Weights { scatter, sigma: std::array::from_fn(|c| scatter[c] * length(c).sqrt()) }
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Weights {
-    scatter: [f64; 2],
-    sigma: [f64; 2],
-}
-
-/// Whether an axle's peak shows: the curve has flattened within the slips visited, and the data fix it there.
-fn evidence(fit: &Fit, offset: usize, slips: &Slips) -> PeakEvidence {
-    let tires = tires_of(&fit.parameters);
-    let axle = if offset == 0 { tires.front } else { tires.rear };
-    let furthest = slips.range_rad.low.abs().max(slips.range_rad.high.abs());
-    let force = axle.max_force_within(furthest);
-    let covariance = fit.covariance_of(&[offset, offset + 1, offset + 2, offset + 3]);
-    let error = force_error(&axle, furthest, covariance.as_ref());
-    let reached = force > PEAK_SHARE * axle.d
-        && axle.normalized_stiffness() * furthest > PEAK_EXCESS * axle.d
-        && error < PEAK_ERROR * force
-        && !fit.on_bound.contains(&(offset + 2));
-    PeakEvidence { reached }
-}
-
-/// Standard error of F_y/F_z at a slip, from the covariance of (k, C, D, E); infinite without one.
-pub(crate) fn force_error(axle: &MagicFormula, slip_rad: f64, covariance: Option<&DMatrix<f64>>) -> f64 {
-    let Some(covariance) = covariance else { return f64::INFINITY };
-    let at = [axle.normalized_stiffness(), axle.c, axle.d, axle.e];
-    let force =
-        |v: &[f64; 4]| MagicFormula::from_stiffness(v[0], v[1], v[2], v[3]).normalized_force(slip_rad);
-    let slope = DVector::from_fn(4, |j, _| {
-        let h = 1e-5 * at[j].abs().max(1e-2);
-        let moved = |by: f64| std::array::from_fn(|i| if i == j { at[i] + by } else { at[i] });
-        (force(&moved(h)) - force(&moved(-h))) / (2.0 * h)
-    });
-    (slope.transpose() * covariance * slope)[(0, 0)].max(0.0).sqrt()
 }

@@ -37,8 +37,8 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// Covariance of the free parameters, in their order, robust to errors that are correlated within a window (sandwich with the windows
-    /// as clusters): H^-1 (sum_w g_w g_w^T) H^-1. Parameters on a bound count as known. `None` where the information is singular.
+    /// Covariance of the free parameters, in their order, robust to errors that are correlated within a window and, in long drives,
+    /// over neighbouring windows, as banking and a drifting v_y make them: a sandwich H^-1 (sum_c g_c g_c^T) H^-1 with at most [`CLUSTERS`] clusters. Parameters on a bound count as known. `None` where the information is singular.
     #[must_use]
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
         let p = self.free.len();
@@ -47,14 +47,16 @@ impl Fit {
         pin(&mut information, None, &pinned);
         let inverse = information.cholesky()?.inverse();
         let mut meat = DMatrix::zeros(p, p);
-        for g in &self.linearization.window_gradients {
-            let mut g = g.clone();
+        let gradients = &self.linearization.window_gradients;
+        let clusters = gradients.chunks(gradients.len().div_ceil(CLUSTERS).max(1));
+        let count = clusters.len() as f64;
+        for cluster in clusters {
+            let mut g = cluster.iter().fold(DVector::zeros(p), |sum, g| sum + g);
             (0..p).filter(|&a| pinned[a]).for_each(|a| g[a] = 0.0);
             meat += &g * g.transpose();
         }
-        let windows = self.linearization.window_gradients.len() as f64;
-        let small_sample = windows / (windows - p as f64).max(1.0);
-        Some(&inverse * meat * &inverse * small_sample)
+        let small_sample = count / (count - p as f64).max(1.0);
+        Some(&inverse * meat * inverse * small_sample)
     }
 
     /// Covariance of some parameters of the model; those that were not free count as known. `None` where the information is singular.
@@ -77,6 +79,9 @@ impl Fit {
         self.covariance().map(|c| c[(place, place)].max(0.0).sqrt())
     }
 }
+
+/// Most clusters of the covariance: enough for its rank, few enough that a long drive's clusters outlast a corner.
+const CLUSTERS: usize = 40;
 
 /// Relative change of the cost under which a fit has converged.
 const TOLERANCE: f64 = 1e-6;

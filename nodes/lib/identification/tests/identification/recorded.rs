@@ -33,6 +33,8 @@ fn the_small_car_shows_its_plateau_and_gives_the_same_bytes_twice() {
     // The plateau of the car is 0.45 to 0.5 g; the front tires limit it.
     let front = outcome.phi_p.front.max_force_within(outcome.slip_range_rad.front.high);
     assert!((0.4..0.6).contains(&front), "front plateau {front}");
+    let peak = &outcome.peak_friction.front;
+    assert!((0.4..0.6).contains(&peak.value), "{peak:?}");
     // Motion capture sees a late command: 80 ms by its authors, servo and transport together.
     assert!((0.03..0.1).contains(&outcome.signals.steering_delay_s), "{:?}", outcome.signals);
     assert!(outcome.rmse.rollout.after < 0.6 * outcome.rmse.rollout.before);
@@ -49,6 +51,11 @@ fn the_indy_car_has_stiffness_but_no_peak() {
     for stiffness in [alone.cornering_stiffness_n_per_rad.front, alone.cornering_stiffness_n_per_rad.rear] {
         assert!(stiffness.low > 0.0 && stiffness.low < stiffness.value && stiffness.value < stiffness.high);
     }
+    // What is known of the recording: v_y is that of a point half a metre ahead of the centre of gravity, 0.15 m/s too high.
+    let signals = &alone.signal_intervals;
+    assert!((signals.v_y_lever_arm_m.low..signals.v_y_lever_arm_m.high).contains(&0.5), "{signals:?}");
+    assert!((signals.v_y_bias_mps.low..signals.v_y_bias_mps.high).contains(&0.15), "{signals:?}");
+    assert!(alone.reasons.iter().any(|r| r.contains("later than a steering")), "{:?}", alone.reasons);
     let with_prior = run(&sequence, &vehicle, Some(1.0), ResidualKind::None);
     assert!(with_prior.accepted, "{:?}", with_prior.reasons);
     for (peak, d) in [
@@ -58,6 +65,18 @@ fn the_indy_car_has_stiffness_but_no_peak() {
         assert!(peak.from_prior && !peak.reached);
         assert_eq!(d, 1.0);
     }
+}
+
+#[test]
+fn no_part_of_the_indy_cars_laps_shows_a_peak() {
+    let Some((sequence, vehicle)) = recorded("iac_putnam", 60.0) else { return };
+    let outcome = run(&sequence, &vehicle, None, ResidualKind::None);
+    assert!(!outcome.accepted && !outcome.peak_friction.front.reached && !outcome.peak_friction.rear.reached);
+    for stiffness in [outcome.cornering_stiffness_n_per_rad.front, outcome.cornering_stiffness_n_per_rad.rear]
+    {
+        assert!(stiffness.low < stiffness.value && stiffness.value < stiffness.high, "{stiffness:?}");
+    }
+    assert!(outcome.signals.v_y_lever_arm_m < vehicle.l_f_m, "{:?}", outcome.signals);
 }
 
 #[test]

@@ -1,0 +1,73 @@
+//! Whether an axle's peak shows in the data.
+
+use gripsight_vehicle::MagicFormula;
+use nalgebra::{DMatrix, DVector};
+
+use crate::Estimate;
+use crate::direct::Slips;
+use crate::rollout::tires_of;
+use crate::shooting::Fit;
+
+/// Whether an axle's peak shows in the data.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PeakEvidence {
+    pub(crate) reached: bool,
+}
+
+/// Share of D that the curve has to reach within the slips visited.
+const PEAK_SHARE: f64 = 0.96;
+/// What the stiffness alone would make of the largest slip has to exceed D by this factor: a knee that comes earlier is the model's, not the tire's.
+const PEAK_EXCESS: f64 = 1.6;
+/// No tire slides at less: a knee that comes earlier is made by the signals.
+const LEAST_PEAK_SLIP_RAD: f64 = 0.05;
+/// Relative standard error of the curve at the largest slip above which the data do not determine it.
+const PEAK_ERROR: f64 = 0.08;
+/// The curve is flat where the upper end of the 90 % interval of its slope is below this share of its slope at zero.
+const FLAT: f64 = 0.15;
+
+/// Whether an axle's peak shows: the curve has flattened within the slips visited, and the data fix its height and its slope there.
+pub(super) fn evidence(fit: &Fit, offset: usize, slips: &Slips) -> PeakEvidence {
+    let tires = tires_of(&fit.parameters);
+    let axle = if offset == 0 { tires.front } else { tires.rear };
+    let furthest = slips.range_rad.low.abs().max(slips.range_rad.high.abs());
+    let force = axle.max_force_within(furthest);
+    let covariance = fit.covariance_of(&[offset, offset + 1, offset + 2, offset + 3]);
+    let error = force_error(&axle, furthest, covariance.as_ref());
+    let slope = |axle: &MagicFormula| slope(axle, furthest);
+    let steepest = slope(&axle) + Estimate::Z90 * error_of(&axle, covariance.as_ref(), slope);
+    let reached = furthest > LEAST_PEAK_SLIP_RAD
+        && force > PEAK_SHARE * axle.d
+        && axle.normalized_stiffness() * furthest > PEAK_EXCESS * axle.d
+        && error < PEAK_ERROR * force
+        && steepest < FLAT * axle.normalized_stiffness()
+        && !fit.on_bound.contains(&(offset + 2));
+    PeakEvidence { reached }
+}
+
+/// d(F_y/F_z)/d(slip), 1/rad.
+fn slope(axle: &MagicFormula, slip_rad: f64) -> f64 {
+    let h = 1e-3 * slip_rad.abs().max(1e-3);
+    (axle.normalized_force(slip_rad + h) - axle.normalized_force(slip_rad - h)) / (2.0 * h)
+}
+
+/// Standard error of F_y/F_z at a slip, from the covariance of (k, C, D, E); infinite without one.
+pub(crate) fn force_error(axle: &MagicFormula, slip_rad: f64, covariance: Option<&DMatrix<f64>>) -> f64 {
+    error_of(axle, covariance, |axle| axle.normalized_force(slip_rad))
+}
+
+/// Standard error of a figure of a tire, from the covariance of (k, C, D, E); infinite without one.
+fn error_of(
+    axle: &MagicFormula,
+    covariance: Option<&DMatrix<f64>>,
+    figure: impl Fn(&MagicFormula) -> f64,
+) -> f64 {
+    let Some(covariance) = covariance else { return f64::INFINITY };
+    let at = [axle.normalized_stiffness(), axle.c, axle.d, axle.e];
+    let value = |v: [f64; 4]| figure(&MagicFormula::from_stiffness(v[0], v[1], v[2], v[3]));
+    let gradient = DVector::from_fn(4, |j, _| {
+        let h = 1e-5 * at[j].abs().max(1e-2);
+        let moved = |by: f64| std::array::from_fn(|i| if i == j { at[i] + by } else { at[i] });
+        (value(moved(h)) - value(moved(-h))) / (2.0 * h)
+    });
+    (gradient.transpose() * covariance * gradient)[(0, 0)].max(0.0).sqrt()
+}

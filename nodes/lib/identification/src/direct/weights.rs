@@ -1,0 +1,42 @@
+//! How much a residual counts.
+
+use crate::data::median;
+use crate::rollout::TireRollout;
+use crate::shooting::{Fit, Rollout, Window};
+
+/// What residuals are divided by: the scatter of each channel about the fit (the median window's root mean square, at least the noise),
+/// times the root of their correlation length. Errors of the model are correlated; counted as independent they would overrule every prior.
+pub(super) fn weights(model: &TireRollout<'_>, fit: &Fit, windows: &[Window], noise: &[f64; 2]) -> Weights {
+    let (mut predicted, mut measured) = (Vec::new(), Vec::new());
+    let mut squares = [Vec::new(), Vec::new()];
+    let len = windows.first().map_or(0, |w| w.len);
+    let mut covariance = [vec![0.0; len], vec![0.0; len]];
+    for (window, start) in windows.iter().zip(&fit.starts) {
+        model.rollout(&fit.parameters, *start, window, &mut predicted);
+        model.measured(window, &mut measured);
+        for channel in 0..2 {
+            let errors: Vec<f64> =
+                predicted.iter().zip(&measured).skip(channel).step_by(2).map(|(p, m)| p - m).collect();
+            squares[channel].push(errors.iter().map(|e| e * e).sum::<f64>() / window.len as f64);
+            for (lag, sum) in covariance[channel].iter_mut().enumerate() {
+                *sum += errors.iter().zip(&errors[lag..]).map(|(a, b)| a * b).sum::<f64>();
+            }
+        }
+    }
+    let scatter =
+        std::array::from_fn(|c| median(&mut squares[c]).unwrap_or(0.0).sqrt().max(0.5 * noise[c]).max(1e-6));
+    let length = |c: usize| {
+        let rho = covariance[c].iter().skip(1).map(|v| v / covariance[c][0].max(f64::MIN_POSITIVE));
+        1.0 + 2.0 * rho.take_while(|r| *r > 0.0).sum::<f64>()
+    };
+    Weights { scatter, sigma: std::array::from_fn(|c| scatter[c] * length(c).sqrt()) }
+}
+
+/// Scatter of a fit.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Weights {
+    /// Of v_y and yaw rate about the rollouts.
+    pub(super) scatter: [f64; 2],
+    /// The same for samples that count as independent.
+    pub(super) sigma: [f64; 2],
+}
