@@ -162,13 +162,7 @@ fn columns_grow_up_to_the_peak_and_are_nan_beyond() {
         assert!(cells[end..].iter().all(|a| a.is_nan()));
     }
     // At the highest speed the grip of the front axle ends the column, and the table comes close to it.
-    let last = table
-        .lateral_acceleration_mps2
-        .iter()
-        .map(|row| row[64])
-        .filter(|a| !a.is_nan())
-        .next_back()
-        .unwrap();
+    let last = table.lateral_acceleration_mps2.iter().map(|row| row[64]).rfind(|a| !a.is_nan()).unwrap();
     let limit = gripsight_vehicle::GRAVITY_MPS2 * 0.9;
     assert!(last < limit && last > 0.98 * limit, "{last} of {limit}");
 }
