@@ -3,6 +3,11 @@
 //! Standard output holds results, standard error progress and logs. Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but the
 //! result is not accepted (or not identifiable).
 
+#![allow(
+    rustdoc::invalid_html_tags,
+    reason = "doc comments of arguments are help texts: <car> is a name left open"
+)]
+
 mod bag;
 mod camera;
 mod diagnose;

@@ -92,7 +92,9 @@ pub(crate) fn judge(run: &Identification, outcome: &mut Outcome) {
         ));
     }
     for (name, value) in &run.direct.signals_on_bound {
-        remarks.push(format!(
+        // A controller steers by the stiffness: one that the data do not hold must not reach it.
+        let list = if name.ends_with(".k") { &mut against } else { &mut remarks };
+        list.push(format!(
             "{name} is on its bound, {value:.3}: the data do not hold it, or ask for what it cannot be"
         ));
     }
