@@ -7,6 +7,7 @@ use gripsight_vehicle::{
 };
 
 use crate::data::Part;
+use crate::direct::height_error;
 use crate::judge::{best_starts, errors_over_horizon, one_step_errors, rollout_errors};
 use crate::picture::{curves, trace};
 use crate::rollout::{NAMES, PARAMETERS, SIGNALS, TireRollout, vector_of};
@@ -193,7 +194,9 @@ fn stiffness(run: &Identification, tires: &PacejkaParameters) -> PerAxle<Estimat
 fn peak_friction(run: &Identification, tires: &PacejkaParameters) -> PerAxle<PeakFriction> {
     let axle = |axle: &MagicFormula, direct: &MagicFormula, offset: usize, reached: bool| {
         if reached {
-            let e = around(axle.d, direct.d, run.direct.fit.standard_error(offset + 2));
+            let slips = if offset == 0 { &run.direct.slips.front } else { &run.direct.slips.rear };
+            let error = height_error(&run.direct.fit, offset, slips);
+            let e = around(axle.d, direct.d, error.is_finite().then_some(error));
             PeakFriction { value: e.value, low: e.low.max(0.0), high: e.high, reached, from_prior: false }
         } else {
             let half = run.prior.map_or(f64::NAN, |p| Estimate::Z90 * p.sigma);

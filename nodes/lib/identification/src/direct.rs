@@ -27,7 +27,7 @@ use crate::sweep::Point;
 use crate::tires::{C_PRIOR, E_PRIOR, parameters};
 use crate::{FrictionPrior, IdentificationError, PerAxle, Range, SignalCorrections};
 
-pub(crate) use peak::{PeakEvidence, force_error};
+pub(crate) use peak::{PeakEvidence, force_error, height_error};
 
 use peak::evidence;
 use signals::signal_parameters;

@@ -33,7 +33,7 @@ pub(super) fn evidence(fit: &Fit, offset: usize, slips: &Slips) -> PeakEvidence 
     let furthest = slips.range_rad.low.abs().max(slips.range_rad.high.abs());
     let force = axle.max_force_within(furthest);
     let covariance = fit.covariance_of(&[offset, offset + 1, offset + 2, offset + 3]);
-    let error = force_error(&axle, furthest, covariance.as_ref());
+    let error = height_error(fit, offset, slips);
     let slope = |axle: &MagicFormula| slope(axle, furthest);
     let steepest = slope(&axle) + Estimate::Z90 * error_of(&axle, covariance.as_ref(), slope);
     let reached = furthest > LEAST_PEAK_SLIP_RAD
@@ -43,6 +43,16 @@ pub(super) fn evidence(fit: &Fit, offset: usize, slips: &Slips) -> PeakEvidence 
         && steepest < FLAT * axle.normalized_stiffness()
         && !fit.on_bound.contains(&(offset + 2));
     PeakEvidence { reached }
+}
+
+/// Standard error of the largest F_y/F_z within the slips visited; infinite where nothing is known of it. (That of D alone says little of a
+/// plateau: there C and D make up for each other.)
+pub(crate) fn height_error(fit: &Fit, offset: usize, slips: &Slips) -> f64 {
+    let tires = tires_of(&fit.parameters);
+    let axle = if offset == 0 { tires.front } else { tires.rear };
+    let furthest = slips.range_rad.low.abs().max(slips.range_rad.high.abs());
+    let covariance = fit.covariance_of(&[offset, offset + 1, offset + 2, offset + 3]);
+    error_of(&axle, covariance.as_ref(), |axle| axle.max_force_within(furthest))
 }
 
 /// d(F_y/F_z)/d(slip), 1/rad.

@@ -38,7 +38,7 @@ pub struct Fit {
 
 impl Fit {
     /// Covariance of the free parameters, in their order, robust to errors that are correlated within a window and, in long drives,
-    /// over neighbouring windows, as banking and a drifting v_y make them: a sandwich H^-1 (sum_c g_c g_c^T) H^-1 with at most [`CLUSTERS`] clusters. Parameters on a bound count as known. `None` where the information is singular.
+    /// over neighbouring windows, as banking and a drifting v_y make them: a sandwich H^-1 (sum_c g_c g_c^T) H^-1 with at most 40 clusters. Parameters on a bound count as known. `None` where the information is singular.
     #[must_use]
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
         let p = self.free.len();
