@@ -14,9 +14,8 @@ pub(crate) struct PeakEvidence {
     pub(crate) reached: bool,
 }
 
-/// Share of D that the curve has to reach within the slips visited. Not more: a tire that saturates without falling nears D slowly, and
-/// whether the curve has flattened is for its slope to say.
-const PEAK_SHARE: f64 = 0.9;
+/// Share of D that the curve has to reach within the slips visited.
+const PEAK_SHARE: f64 = 0.96;
 /// What the stiffness alone would make of the largest slip has to exceed D by this factor: a knee that comes earlier is the model's, not the tire's.
 const PEAK_EXCESS: f64 = 1.6;
 /// No tire slides at less: a knee that comes earlier is made by the signals.
