@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use gripsight_identification::{Estimate, Outcome, PeakFriction, Range};
-use gripsight_report::text::{fixed, interval, significant, with_interval};
+use gripsight_identification::{Outcome, Range};
+use gripsight_report::text::{estimate, interval, peak_friction, significant, with_interval};
 
 use super::progress::Timing;
 
@@ -66,25 +66,13 @@ pub(super) fn summary(car: &str, result: &Outcome, files: &[PathBuf], timing: &T
 }
 
 fn tires(text: &mut String, result: &Outcome) {
-    let estimate = |e: &Estimate| {
-        let (value, interval) = with_interval(e.value, e.low, e.high);
-        format!("{value} ({interval})")
-    };
-    let peak = |p: &PeakFriction| {
-        let (value, interval) = with_interval(p.value, p.low, p.high);
-        match (p.reached, p.from_prior) {
-            (true, _) => format!("{value} ({interval})"),
-            (false, true) => format!("{} from the prior", fixed(p.value, 2)),
-            (false, false) => "not reached".to_owned(),
-        }
-    };
     let slip = |r: &Range| interval(r.low.to_degrees(), r.high.to_degrees());
     let letters =
         |t: &gripsight_vehicle::MagicFormula| [t.b, t.c, t.d, t.e].map(|v| significant(v, 3)).join("  ");
     let (k, d, s) = (&result.cornering_stiffness_n_per_rad, &result.peak_friction, &result.slip_range_rad);
     let rows = [
         ("", "front".to_owned(), "rear".to_owned()),
-        ("peak friction", peak(&d.front), peak(&d.rear)),
+        ("peak friction", peak_friction(&d.front), peak_friction(&d.rear)),
         ("cornering stiffness N/rad", estimate(&k.front), estimate(&k.rear)),
         ("slip visited deg", slip(&s.front), slip(&s.rear)),
         ("B  C  D  E", letters(&result.phi_p.front), letters(&result.phi_p.rear)),

@@ -1,5 +1,7 @@
 //! Numbers as people read them, on pages and on the terminal.
 
+use gripsight_identification::{Estimate, PeakFriction};
+
 /// A dash where there is nothing to say.
 const NOTHING: &str = "–";
 
@@ -50,6 +52,25 @@ pub fn with_interval(value: f64, low: f64, high: f64) -> (String, String) {
         return (significant(value, 3), NOTHING.into());
     }
     (fixed(value, interval_decimals(low, high)), interval(low, high))
+}
+
+/// An estimate with its interval behind it.
+#[must_use]
+pub fn estimate(e: &Estimate) -> String {
+    let (value, interval) = with_interval(e.value, e.low, e.high);
+    format!("{value} ({interval})")
+}
+
+/// Peak friction with its interval, or what stands in its place.
+#[must_use]
+pub fn peak_friction(peak: &PeakFriction) -> String {
+    if peak.reached {
+        estimate(&Estimate { value: peak.value, low: peak.low, high: peak.high })
+    } else if peak.from_prior {
+        format!("{} from the prior", fixed(peak.value, 2))
+    } else {
+        "not reached".to_owned()
+    }
 }
 
 /// Two digits of the interval's width, but no more than four of the numbers.

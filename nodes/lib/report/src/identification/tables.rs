@@ -1,11 +1,11 @@
 //! The tables of an identification.
 
-use gripsight_identification::{Estimate, Outcome, PeakFriction, Range};
+use gripsight_identification::{Outcome, Range};
 use maud::{Markup, html};
 
 use crate::health::health;
 use crate::page::{facts_table, list, table};
-use crate::text::{fixed, interval, percent, significant, with_interval};
+use crate::text::{estimate, fixed, interval, peak_friction, percent, significant, with_interval};
 
 /// Parameters, stiffness, grip and slip visited.
 pub(super) fn tires(outcome: &Outcome) -> Markup {
@@ -17,25 +17,17 @@ pub(super) fn tires(outcome: &Outcome) -> Markup {
     let letter = |name: &str, letter: &str, front: f64, rear: f64| {
         [name.to_owned(), bound(&format!("front.{letter}"), front), bound(&format!("rear.{letter}"), rear)]
     };
-    let estimate = |e: &Estimate| {
-        let (value, interval) = with_interval(e.value, e.low, e.high);
-        format!("{value} ({interval})")
-    };
-    let peak = |p: &PeakFriction| {
-        let (value, interval) = with_interval(p.value, p.low, p.high);
-        match (p.reached, p.from_prior) {
-            (true, _) => format!("{value} ({interval})"),
-            (false, true) => format!("{} from prior", fixed(p.value, 2)),
-            (false, false) => "peak not reached".to_owned(),
-        }
-    };
     let slip = |r: &Range| format!("{}°", interval(r.low.to_degrees(), r.high.to_degrees()));
     let stiffness = &outcome.cornering_stiffness_n_per_rad;
     table(
         ["", "Front", "Rear"],
         &[
             ["Cornering stiffness / (N/rad)".into(), estimate(&stiffness.front), estimate(&stiffness.rear)],
-            ["Peak friction".into(), peak(&outcome.peak_friction.front), peak(&outcome.peak_friction.rear)],
+            [
+                "Peak friction".into(),
+                peak_friction(&outcome.peak_friction.front),
+                peak_friction(&outcome.peak_friction.rear),
+            ],
             ["Slip visited".into(), slip(&outcome.slip_range_rad.front), slip(&outcome.slip_range_rad.rear)],
             letter("B / (1/rad)", "b", f.b, r.b),
             letter("C", "c", f.c, r.c),
