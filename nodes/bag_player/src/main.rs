@@ -6,5 +6,5 @@ mod pace;
 mod source;
 
 fn main() -> anyhow::Result<()> {
-    gripsight_runtime::run("bag_player", node::setup)
+    gripsight_runtime::run("bag_player", include_str!("../README.md"), node::setup)
 }

@@ -5,5 +5,5 @@ mod node;
 mod settings;
 
 fn main() -> anyhow::Result<()> {
-    gripsight_runtime::run("camera_prior", node::setup)
+    gripsight_runtime::run("camera_prior", include_str!("../README.md"), node::setup)
 }

@@ -6,5 +6,5 @@ mod node;
 mod report;
 
 fn main() -> anyhow::Result<()> {
-    gripsight_runtime::run("gap_diagnosis", node::setup)
+    gripsight_runtime::run("gap_diagnosis", include_str!("../README.md"), node::setup)
 }

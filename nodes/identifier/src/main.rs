@@ -6,5 +6,5 @@ mod outputs;
 mod run;
 
 fn main() -> anyhow::Result<()> {
-    gripsight_runtime::run("identifier", node::setup)
+    gripsight_runtime::run("identifier", include_str!("../README.md"), node::setup)
 }

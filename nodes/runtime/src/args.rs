@@ -62,7 +62,7 @@ impl Args {
                 (true, "--") => in_ros_args = false,
                 (true, flag) => args.ros_argument(flag, &mut words)?,
                 (false, _) => {
-                    let hint = "settings go through parameters: --ros-args -p name:=value";
+                    let hint = "settings go through parameters: --ros-args -p name:=value; see --help";
                     return Err(Error::Arguments(format!("unexpected `{word}`; {hint}")));
                 }
             }

@@ -5,5 +5,5 @@ mod node;
 mod recent;
 
 fn main() -> anyhow::Result<()> {
-    gripsight_runtime::run("s4_residual", node::setup)
+    gripsight_runtime::run("s4_residual", include_str!("../README.md"), node::setup)
 }

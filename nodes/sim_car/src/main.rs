@@ -5,5 +5,5 @@ mod node;
 mod settings;
 
 fn main() -> anyhow::Result<()> {
-    gripsight_runtime::run("sim_car", node::setup)
+    gripsight_runtime::run("sim_car", include_str!("../README.md"), node::setup)
 }

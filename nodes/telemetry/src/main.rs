@@ -5,5 +5,5 @@ mod diagnostics;
 mod node;
 
 fn main() -> anyhow::Result<()> {
-    gripsight_runtime::run("telemetry", node::setup)
+    gripsight_runtime::run("telemetry", include_str!("../README.md"), node::setup)
 }
