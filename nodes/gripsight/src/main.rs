@@ -15,6 +15,7 @@ mod friction;
 mod identify;
 mod invocation;
 mod simulate;
+mod withheld;
 
 use std::io::IsTerminal as _;
 use std::process::ExitCode;
@@ -40,6 +41,7 @@ enum Command {
     Diagnose(diagnose::DiagnoseArgs),
     Friction(friction::FrictionArgs),
     Simulate(simulate::SimulateArgs),
+    Withheld(withheld::WithheldArgs),
     Bag(bag::BagArgs),
 }
 
@@ -80,6 +82,7 @@ fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Friction(args) => friction::run(&args),
         Command::Simulate(args) => simulate::run(&args),
+        Command::Withheld(args) => withheld::run(&args),
         Command::Bag(args) => bag::run(&args),
     }
 }

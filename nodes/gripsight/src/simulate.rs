@@ -110,7 +110,7 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Outcome> {
     let file =
         File::create(&truth_path).with_context(|| format!("cannot create {}", truth_path.display()))?;
     write_truth_csv(BufWriter::new(file), &recording.truth, START_NS as f64 * 1e-9)?;
-    std::fs::write(&vehicle_path, vehicle_file(&car))
+    std::fs::write(&vehicle_path, car.vehicle_file(&car.name))
         .with_context(|| format!("cannot write {}", vehicle_path.display()))?;
     println!("{}: {messages} messages", args.out.display());
     println!("{}: {} rows", truth_path.display(), recording.truth.len());
@@ -190,21 +190,4 @@ fn write_picture(bag: &mut BagWriter, camera: &RoadCamera, exposure: &Exposure) 
     let stamp_ns = exposure.stamp_ns(START_NS);
     let picture = encode::jpeg(stamp_ns, camera.expose(exposure)?);
     Ok(bag.write("/camera/image/compressed", stamp_ns, &picture)?)
-}
-
-/// The nominal car as the other subcommands read it.
-fn vehicle_file(car: &CarParameters) -> String {
-    let rows = [
-        ("mass_kg", car.mass_kg),
-        ("yaw_inertia_kgm2", car.yaw_inertia_kgm2),
-        ("l_f_m", car.l_f_m),
-        ("l_r_m", car.l_r_m),
-        ("h_cg_m", car.h_cg_m),
-        ("drive_front_share", car.drive.drive_front_share),
-        ("brake_front_share", car.drive.brake_front_share),
-        ("max_steering_rad", car.max_steering_rad),
-        ("wheel_radius_m", car.drive.wheel_radius_m),
-    ];
-    let rows: String = rows.iter().map(|(name, value)| format!("      {name}: {value:?}\n")).collect();
-    format!("/**:\n  ros__parameters:\n    vehicle:\n      name: {}\n{rows}", car.name)
 }

@@ -130,6 +130,23 @@ impl CarParameters {
         self.load_sensitivity * (2.0 * self.h_cg_m * limit / self.track_width_m).min(1.0).powi(2)
     }
 
+    /// This car as a ROS 2 parameter file, under a name.
+    pub fn vehicle_file(&self, name: &str) -> String {
+        let rows = [
+            ("mass_kg", self.mass_kg),
+            ("yaw_inertia_kgm2", self.yaw_inertia_kgm2),
+            ("l_f_m", self.l_f_m),
+            ("l_r_m", self.l_r_m),
+            ("h_cg_m", self.h_cg_m),
+            ("drive_front_share", self.drive.drive_front_share),
+            ("brake_front_share", self.drive.brake_front_share),
+            ("max_steering_rad", self.max_steering_rad),
+            ("wheel_radius_m", self.drive.wheel_radius_m),
+        ];
+        let rows: String = rows.iter().map(|(name, value)| format!("      {name}: {value:?}\n")).collect();
+        format!("/**:\n  ros__parameters:\n    vehicle:\n      name: {name}\n{rows}")
+    }
+
     /// Speed below which slips are taken over this speed, so that standstill stays well posed.
     pub fn low_speed_mps(&self) -> f64 {
         0.3 * (GRAVITY_MPS2 * self.wheelbase_m()).sqrt()

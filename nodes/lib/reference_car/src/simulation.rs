@@ -201,6 +201,12 @@ impl Simulation {
         self.place = other.place;
     }
 
+    /// Pushes the car: adds to its lateral speed and yaw rate at once.
+    pub fn nudge(&mut self, v_y_mps: f64, yaw_rate_radps: f64) {
+        self.state.v_y_mps += v_y_mps;
+        self.state.yaw_rate_radps += yaw_rate_radps;
+    }
+
     /// Takes what the sensors reported since the last call, by stamp, and the truth at the odometry's stamps.
     pub fn drain(&mut self) -> (Vec<SensorSample>, Vec<TruthSample>) {
         let mut samples = std::mem::take(&mut self.samples);

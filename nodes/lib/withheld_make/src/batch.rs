@@ -1,0 +1,204 @@
+//! A batch of cases.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use gripsight_reference_car::{EffectSetting, effect_spec};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::draw::{self, Drive, Pool};
+use crate::label::{CaseLabel, Kind, Labels, OracleFit, SealedEffect};
+use crate::oracle::oracle_fits;
+use crate::plan::{self, Planned};
+use crate::{WithheldError, drive, tires};
+
+/// Files of a case, in its folder.
+pub mod files {
+    /// The drive to be explained.
+    pub const BAG: &str = "bag.mcap";
+    /// Another drive of the same car in the same state.
+    pub const HELD_OUT: &str = "heldout.mcap";
+    /// The car.
+    pub const VEHICLE: &str = "vehicle.yaml";
+    /// The tires, a few percent off; not there for recorded drives.
+    pub const TIRES: &str = "pacejka.yaml";
+    /// Effects to leave out of the library, one a line.
+    pub const WITHOUT: &str = "without.txt";
+}
+
+/// Drives tried until one comes to its end.
+const TRIES: usize = 40;
+
+/// What makes up a batch.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BatchSettings {
+    /// Cases of the reference car.
+    pub cases: usize,
+    /// Seed of everything but the nonce.
+    pub seed: u64,
+    /// Cars and tracks.
+    pub pool: Pool,
+    /// Length of every bag.
+    pub duration_s: f64,
+}
+
+/// A batch as it is planned. Cases can be made in any order.
+#[derive(Debug, Clone)]
+pub struct Batch {
+    settings: BatchSettings,
+    plan: Vec<Planned>,
+}
+
+impl Batch {
+    /// Plans a batch.
+    #[must_use]
+    pub fn new(settings: BatchSettings) -> Self {
+        let plan = plan::reference(settings.cases, &mut ChaCha8Rng::seed_from_u64(settings.seed));
+        Self { settings, plan }
+    }
+
+    /// What it is made of.
+    #[must_use]
+    pub fn settings(&self) -> &BatchSettings {
+        &self.settings
+    }
+
+    /// Number of cases.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.plan.len()
+    }
+
+    /// Whether there is no case.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.plan.is_empty()
+    }
+
+    /// The labels of all cases, with a nonce.
+    ///
+    /// # Errors
+    /// [`WithheldError::Content`] where the settings cannot be written as JSON.
+    pub fn labels(&self, nonce: String, cases: Vec<CaseLabel>) -> Result<Labels, WithheldError> {
+        let settings = serde_json::to_value(&self.settings)
+            .and_then(serde_json::from_value::<BTreeMap<String, Value>>)
+            .map_err(|e| WithheldError::content(Path::new("settings"), e))?;
+        Ok(Labels { nonce, seed: self.settings.seed, settings, cases })
+    }
+
+    /// Name of a case's folder.
+    #[must_use]
+    pub fn case_name(&self, index: usize) -> String {
+        format!("case_{:04}", index + 1)
+    }
+
+    /// Makes a case: its folder in `folder`, complete or not there at all, and its label.
+    ///
+    /// # Errors
+    /// [`WithheldError`].
+    pub fn make(&self, index: usize, folder: &Path) -> Result<CaseLabel, WithheldError> {
+        let mut random = ChaCha8Rng::seed_from_u64(self.settings.seed);
+        random.set_stream(index as u64 + 1);
+        let case = self.case_name(index);
+        let part = folder.join(format!("{case}.part"));
+        if part.exists() {
+            fs::remove_dir_all(&part).map_err(WithheldError::io(&part))?;
+        }
+        fs::create_dir_all(&part).map_err(WithheldError::io(&part))?;
+        let planned = &self.plan[index];
+        let label = self.reference_case(case.clone(), planned, &part, &mut random)?;
+        let whole = folder.join(&case);
+        if whole.exists() {
+            fs::remove_dir_all(&whole).map_err(WithheldError::io(&whole))?;
+        }
+        fs::rename(&part, &whole).map_err(WithheldError::io(&whole))?;
+        Ok(label)
+    }
+
+    fn reference_case(
+        &self,
+        case: String,
+        planned: &Planned,
+        folder: &Path,
+        random: &mut ChaCha8Rng,
+    ) -> Result<CaseLabel, WithheldError> {
+        let run_s = self.settings.duration_s + 2.0 * drive::MARGIN_S;
+        let mut last = None;
+        for _ in 0..TRIES {
+            let Drive { mut scenario, race_pace, circumstances } =
+                draw::drive(self.settings.pool, run_s, random)?;
+            let asked = planned
+                .effects
+                .iter()
+                .map(|name| draw::sized(name, &scenario, random))
+                .collect::<Result<Vec<_>, _>>()?;
+            scenario.effects.retain(|own| asked.iter().all(|a| a.name != own.name));
+            scenario.effects.extend(asked.iter().cloned());
+            let held_out = draw::another(&scenario, random);
+            let (first, second) = match (drive::driven(&scenario)?, drive::driven(&held_out)?) {
+                (Ok(first), Ok(second)) => (first, second),
+                (Err(end), _) | (_, Err(end)) => {
+                    last = Some(end);
+                    continue;
+                }
+            };
+            let mu = scenario.friction.nominal();
+            let axles = tires::off_by_a_little(tires::true_axles(&scenario.car, mu), random);
+            let without = left_out(planned, random);
+            let duration_s = self.settings.duration_s;
+            drive::write(&folder.join(files::BAG), &drive::between_margins(&first, duration_s))?;
+            drive::write(&folder.join(files::HELD_OUT), &drive::between_margins(&second, duration_s))?;
+            text(&folder.join(files::VEHICLE), &scenario.car.vehicle_file("car"))?;
+            text(&folder.join(files::TIRES), &tires::file(axles))?;
+            text(&folder.join(files::WITHOUT), &(without.join("\n") + "\n"))?;
+            let fits = oracle_fits(&scenario, &asked)?;
+            let effects = asked
+                .into_iter()
+                .zip(fits)
+                .map(|(setting, fit)| sealed(setting, Some(fit)))
+                .collect::<Result<_, _>>()?;
+            return Ok(CaseLabel {
+                case,
+                family: planned.family,
+                kind: planned.kind,
+                effects,
+                without,
+                race_pace,
+                contained: Vec::new(),
+                circumstances,
+            });
+        }
+        let last = last.unwrap_or(gripsight_reference_car::EndReason::Completed);
+        Err(WithheldError::NoDrive { tries: TRIES, last })
+    }
+}
+
+fn left_out(planned: &Planned, random: &mut ChaCha8Rng) -> Vec<String> {
+    let deleted = planned.effects.first().copied().filter(|_| planned.kind == Kind::Deleted);
+    draw::left_out(&planned.effects, deleted, random)
+}
+
+/// An effect with its size in the library's terms.
+fn sealed(setting: EffectSetting, oracle: Option<OracleFit>) -> Result<SealedEffect, WithheldError> {
+    let spec = effect_spec(&setting.name)?;
+    let ratio = oracle.map_or(1.0, |fit| fit.size_ratio);
+    let sizing: Vec<&str> = draw::sizing(spec).collect();
+    let library_parameters = setting
+        .parameters
+        .iter()
+        .map(|(name, value)| {
+            let null = spec.parameters.iter().find(|p| p.name == name).and_then(|p| p.null);
+            let scaled = null.map_or(*value, |null| null + ratio * (value - null));
+            (name.clone(), if sizing.contains(&name.as_str()) { scaled } else { *value })
+        })
+        .collect();
+    Ok(SealedEffect { name: setting.name, parameters: setting.parameters, library_parameters, oracle })
+}
+
+fn text(path: &Path, content: &str) -> Result<(), WithheldError> {
+    fs::write(path, content).map_err(WithheldError::io(path))
+}

@@ -1,0 +1,259 @@
+//! The generator's own fit of an effect: what a drive can show of it, before any diagnosis.
+//!
+//! Beside the car at work drive copies of it that are put onto its state every half second and get the same commands: one
+//! without the effect, four with other tires, two with other start states, one without the background. What they report
+//! differs from the car's reports by the response `e` of the effect, `T` of the tires, `S` of the start states, `m` of the background. With
+//! `S` projected out window by window and the responses whitened by the sensors' noise, weighted least squares with the
+//! tires known to [`TIRE_TRUST`] gives
+//!
+//! ```text
+//! [a, t] = N^-1 [e, T]' y,    N = [e, T]'[e, T] + diag(0, 1/trust^2)
+//! standard error of a: noise (white and coloured) and the scatter of the background's contribution over windows
+//! size ratio: 1 + a(m), the noise-free best fit over the mechanism's size; severity: 1/(5 standard errors)
+//! ```
+//!
+//! This is the fit of the candidate to the plant's response, linear about the true size, with the plant's own mechanism as
+//! the candidate: the mechanisms' constants are the library's (the reference car's README names the four that need a word).
+
+use gripsight_reference_car::{
+    CarParameters, EffectSetting, Scenario, SensorSample, SensorSettings, Simulation, TireParameters,
+};
+use nalgebra::{DMatrix, DVector};
+
+use crate::WithheldError;
+use crate::label::OracleFit;
+
+/// Standard deviation with which peak and stiffness of the tires are known.
+pub const TIRE_TRUST: f64 = 0.03;
+
+const WINDOW: usize = 50;
+const SAMPLE_STEPS: u64 = 10;
+/// Step of the tires' peak and stiffness, relative.
+const TIRE_STEP: f64 = 0.02;
+/// Steps of the start states.
+const V_Y_STEP_MPS: f64 = 0.02;
+const YAW_RATE_STEP_RADPS: f64 = 0.02;
+/// Standard errors that make a detection.
+const DETECTION: f64 = 5.0;
+/// Lateral speed, yaw rate, forward speed less its mean, a_y - v_x r.
+const CHANNELS: usize = 4;
+const TIRES: usize = 4;
+/// Variance of the mean of a coloured noise over windows as long as its correlation time, over that of independent ones.
+const COLOURED_INFLATION: f64 = 2.2;
+
+/// One report of odometry and inertial unit.
+type Report = [f64; CHANNELS];
+
+/// Fits every effect of `asked` on a drive of the scenario, which holds them and the background.
+///
+/// # Errors
+/// [`WithheldError::ReferenceCar`].
+pub fn oracle_fits(scenario: &Scenario, asked: &[EffectSetting]) -> Result<Vec<OracleFit>, WithheldError> {
+    let names: Vec<&str> = asked.iter().map(|e| e.name.as_str()).collect();
+    let exact = |scenario: Scenario| {
+        let camera_off = SensorSettings::exact();
+        Simulation::new(scenario.sensors(camera_off))
+    };
+    let without = |left_out: &dyn Fn(&str) -> bool| {
+        let mut copy = scenario.clone();
+        copy.effects.retain(|e| !left_out(&e.name));
+        copy
+    };
+    let bare = without(&|name| names.contains(&name));
+    let mut copies = vec![exact(bare.clone())?, exact(bare.clone())?, exact(bare.clone())?];
+    copies.push(exact(without(&|_| true))?);
+    for change in TIRE_CHANGES {
+        let mut copy = bare.clone();
+        change(&mut copy.car);
+        copies.push(exact(copy)?);
+    }
+    for name in &names {
+        copies.push(exact(without(&|other| other == *name))?);
+    }
+    let reports = drive_beside(exact(scenario.clone())?, copies);
+    Ok(fits(scenario, &reports, asked.len()))
+}
+
+const TIRE_CHANGES: [fn(&mut CarParameters); TIRES] = [
+    |car| raise(&mut car.tire_front, true),
+    |car| raise(&mut car.tire_front, false),
+    |car| raise(&mut car.tire_rear, true),
+    |car| raise(&mut car.tire_rear, false),
+];
+
+fn raise(tire: &mut TireParameters, peak: bool) {
+    let value = if peak { &mut tire.grip } else { &mut tire.cornering_stiffness_per_rad };
+    *value *= 1.0 + TIRE_STEP;
+}
+
+/// Drives a car and its copies; the first list is the car's, the second and third copy start with another state.
+fn drive_beside(mut car: Simulation, mut copies: Vec<Simulation>) -> Vec<Vec<Report>> {
+    let steps = (car.scenario().duration_s / car.scenario().step_s).round() as u64;
+    let command_steps = (1.0 / (car.scenario().driver.rate_hz * car.scenario().step_s)).round() as u64;
+    for step in 0..steps {
+        if step.is_multiple_of(SAMPLE_STEPS * WINDOW as u64) {
+            for (place, copy) in copies.iter_mut().enumerate() {
+                copy.follow(&car);
+                match place {
+                    1 => copy.nudge(V_Y_STEP_MPS, 0.0),
+                    2 => copy.nudge(0.0, YAW_RATE_STEP_RADPS),
+                    _ => {}
+                }
+            }
+        }
+        let ended = car.drive().is_err();
+        for copy in &mut copies {
+            if step.is_multiple_of(command_steps) {
+                copy.command(car.commanded());
+            }
+            if ended || copy.step().is_err() {
+                // A short drive says less; it is no error.
+                return collect(&mut car, &mut copies);
+            }
+        }
+    }
+    collect(&mut car, &mut copies)
+}
+
+fn collect(car: &mut Simulation, copies: &mut [Simulation]) -> Vec<Vec<Report>> {
+    std::iter::once(car).chain(copies).map(|simulation| reports(&simulation.drain().0)).collect()
+}
+
+fn reports(samples: &[SensorSample]) -> Vec<Report> {
+    let mut out: Vec<Report> = Vec::new();
+    let mut odometry = None;
+    for sample in samples {
+        match sample {
+            SensorSample::Odometry(o) => odometry = Some(*o),
+            SensorSample::Imu(imu) => {
+                if let Some(o) = odometry.take() {
+                    out.push([
+                        o.v_y_mps,
+                        o.yaw_rate_radps,
+                        o.v_x_mps,
+                        imu.a_y_mps2 - o.v_x_mps * o.yaw_rate_radps,
+                    ]);
+                }
+            }
+            SensorSample::Drive(_) | SensorSample::Wheels(_) => {}
+        }
+    }
+    out
+}
+
+/// White and coloured noise of every channel.
+fn noise(scenario: &Scenario, mean_speed_mps: f64) -> [[f64; CHANNELS]; 2] {
+    let s = &scenario.sensors;
+    let kinematic = |a: f64, rate: f64| a.hypot(mean_speed_mps * rate);
+    [
+        [s.v_y.white, s.yaw_rate.white, s.v_x.white, kinematic(s.acceleration.white, s.yaw_rate.white)],
+        [
+            s.v_y.coloured,
+            s.yaw_rate.coloured,
+            // Without its mean, a slow noise is gone.
+            0.0,
+            kinematic(s.acceleration.coloured, s.yaw_rate.coloured),
+        ],
+    ]
+}
+
+/// A window's whitened responses, what start states imitate taken out: the effects, the tires, the background.
+struct Window {
+    responses: DMatrix<f64>,
+    background: DVector<f64>,
+}
+
+fn fits(scenario: &Scenario, reports: &[Vec<Report>], effects: usize) -> Vec<OracleFit> {
+    let samples = reports.iter().map(Vec::len).min().unwrap_or(0);
+    let [car, bare, ..] = reports else { return Vec::new() };
+    let mean_speed_mps = bare.iter().map(|r| r[2]).sum::<f64>() / samples.max(1) as f64;
+    let [white, coloured] = noise(scenario, mean_speed_mps);
+    let windows: Vec<Window> = (0..samples / WINDOW)
+        .map(|w| {
+            let column = |a: &[Report], b: &[Report], step: f64| {
+                whitened(&a[w * WINDOW..(w + 1) * WINDOW], &b[w * WINDOW..(w + 1) * WINDOW], step, &white)
+            };
+            // In the order of `oracle_fits`: bare, two starts, no background, the tires, each effect left out.
+            let starts = [2, 3].map(|i| column(&reports[i], bare, 1.0));
+            let starts = orthonormal(starts);
+            let tires = (5..5 + TIRES).map(|i| column(&reports[i], bare, TIRE_STEP));
+            let left_out = (5 + TIRES..5 + TIRES + effects).map(|i| column(car, &reports[i], 1.0));
+            let columns: Vec<DVector<f64>> =
+                left_out.chain(tires).map(|c| without_starts(c, &starts)).collect();
+            let background = without_starts(column(bare, &reports[4], 1.0), &starts);
+            Window { responses: DMatrix::from_columns(&columns), background }
+        })
+        .collect();
+    (0..effects).map(|effect| fit(&windows, effects, effect, &white, &coloured)).collect()
+}
+
+/// The difference of two lists of reports, channel by channel, over step and noise.
+fn whitened(a: &[Report], b: &[Report], step: f64, white: &[f64; CHANNELS]) -> DVector<f64> {
+    let mut column = Vec::with_capacity(a.len() * CHANNELS);
+    for (channel, noise) in white.iter().enumerate() {
+        let difference: Vec<f64> = a.iter().zip(b).map(|(a, b)| (a[channel] - b[channel]) / step).collect();
+        // The start of the forward speed is free, too.
+        let mean = difference.iter().sum::<f64>() / difference.len() as f64;
+        let taken_out = if channel == 2 { mean } else { 0.0 };
+        column.extend(difference.iter().map(|d| (d - taken_out) / noise.max(1e-9)));
+    }
+    DVector::from_vec(column)
+}
+
+fn orthonormal([first, second]: [DVector<f64>; 2]) -> [DVector<f64>; 2] {
+    let first = first.try_normalize(1e-12).unwrap_or_else(|| DVector::zeros(second.len()));
+    let rest = &second - &first * first.dot(&second);
+    let rest = rest.try_normalize(1e-12).unwrap_or_else(|| DVector::zeros(second.len()));
+    [first, rest]
+}
+
+fn without_starts(mut column: DVector<f64>, starts: &[DVector<f64>; 2]) -> DVector<f64> {
+    for start in starts {
+        let share = start.dot(&column);
+        column.axpy(-share, start, 1.0);
+    }
+    column
+}
+
+fn fit(
+    windows: &[Window],
+    effects: usize,
+    effect: usize,
+    white: &[f64; CHANNELS],
+    coloured: &[f64; CHANNELS],
+) -> OracleFit {
+    let nothing = OracleFit { severity: 0.0, size_ratio: 1.0, chi2_per_residual: 0.0 };
+    let mut information = DMatrix::zeros(effects + TIRES, effects + TIRES);
+    for i in effects..effects + TIRES {
+        information[(i, i)] = TIRE_TRUST.powi(-2);
+    }
+    for window in windows {
+        information += window.responses.tr_mul(&window.responses);
+    }
+    let Some(inverse) = information.clone().try_inverse() else { return nothing };
+    let gains = inverse.column(effect).clone_owned();
+    let mut from_background = Vec::with_capacity(windows.len());
+    let mut coloured_variance = 0.0;
+    for window in windows {
+        let weights = &window.responses * &gains;
+        from_background.push(weights.dot(&window.background));
+        for channel in 0..CHANNELS {
+            let sum: f64 = weights.rows(channel * WINDOW, WINDOW).sum();
+            coloured_variance += (sum * coloured[channel] / white[channel].max(1e-9)).powi(2);
+        }
+    }
+    let count = windows.len().max(1) as f64;
+    let bias: f64 = from_background.iter().sum();
+    let scatter: f64 = from_background.iter().map(|b| (b - bias / count).powi(2)).sum();
+    let variance = inverse[(effect, effect)] + COLOURED_INFLATION * coloured_variance + scatter;
+    let own = 1.0 / inverse[(effect, effect)];
+    let residuals = count * (WINDOW * CHANNELS) as f64;
+    if !(variance.is_finite() && variance > 0.0 && bias.is_finite()) {
+        return nothing;
+    }
+    OracleFit {
+        severity: 1.0 / (DETECTION * variance.sqrt()),
+        size_ratio: 1.0 + bias,
+        chi2_per_residual: own / residuals,
+    }
+}
