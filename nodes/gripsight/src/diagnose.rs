@@ -125,7 +125,8 @@ fn outcome(result: &Diagnosis) -> Outcome {
     if result.verdict == Verdict::NotIdentifiable { Outcome::NotAccepted } else { Outcome::Done }
 }
 
-fn vehicle(path: Option<&Path>) -> anyhow::Result<VehicleParameters> {
+/// The car of a parameter file.
+pub(crate) fn vehicle(path: Option<&Path>) -> anyhow::Result<VehicleParameters> {
     let Some(path) = path else {
         tracing::warn!("no --vehicle: taking the values of an F1TENTH-class 1:10 car");
         return Ok(VehicleParameters::f1tenth());
@@ -134,13 +135,14 @@ fn vehicle(path: Option<&Path>) -> anyhow::Result<VehicleParameters> {
     VehicleParameters::from_ros_yaml(&text).with_context(|| format!("cannot use {}", path.display()))
 }
 
-fn tires(path: &Path) -> anyhow::Result<gripsight_vehicle::PacejkaParameters> {
+/// The tires of a file.
+pub(crate) fn tires(path: &Path) -> anyhow::Result<gripsight_vehicle::PacejkaParameters> {
     let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
     read_tires(&text).with_context(|| format!("cannot use {}", path.display()))
 }
 
 /// The longest recorded sequence, or everything in one.
-fn read(path: &Path, topics: &TopicMap) -> anyhow::Result<(StateSequence, ReadReport)> {
+pub(crate) fn read(path: &Path, topics: &TopicMap) -> anyhow::Result<(StateSequence, ReadReport)> {
     let whole = WindowConfig { length_s: f64::INFINITY, hop_s: f64::INFINITY };
     let (sequences, report) =
         read_sequences(path, topics, whole).with_context(|| format!("cannot read {}", path.display()))?;

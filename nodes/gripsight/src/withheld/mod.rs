@@ -1,6 +1,9 @@
 //! `gripsight withheld`: the blind check of the diagnosis.
 
+mod case;
+mod diagnose;
 mod make;
+mod score;
 
 use clap::{Args, Subcommand};
 
@@ -28,11 +31,15 @@ Each step uses all cores, can be stopped at any time and, called again in the sa
 #[derive(Debug, Subcommand)]
 enum WithheldCommand {
     Make(make::MakeArgs),
+    Diagnose(diagnose::DiagnoseArgs),
+    Score(score::ScoreArgs),
 }
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &WithheldArgs) -> anyhow::Result<Outcome> {
     match &args.command {
         WithheldCommand::Make(args) => make::run(args),
+        WithheldCommand::Diagnose(args) => diagnose::run(args),
+        WithheldCommand::Score(args) => score::run(args),
     }
 }

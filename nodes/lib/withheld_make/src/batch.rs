@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use gripsight_reference_car::{EffectSetting, effect_spec};
+use gripsight_reference_car::{EffectSetting, Scenario, effect_spec};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -155,7 +155,8 @@ impl Batch {
             text(&folder.join(files::VEHICLE), &scenario.car.vehicle_file("car"))?;
             text(&folder.join(files::TIRES), &tires::file(axles))?;
             text(&folder.join(files::WITHOUT), &(without.join("\n") + "\n"))?;
-            let fits = oracle_fits(&scenario, &asked)?;
+            let stand_ins = stand_ins(planned, &without, &scenario)?;
+            let fits = oracle_fits(&scenario, &asked, &stand_ins)?;
             let effects = asked
                 .into_iter()
                 .zip(fits)
@@ -180,6 +181,20 @@ impl Batch {
 fn left_out(planned: &Planned, random: &mut ChaCha8Rng) -> Vec<String> {
     let deleted = planned.effects.first().copied().filter(|_| planned.kind == Kind::Deleted);
     draw::left_out(&planned.effects, deleted, random)
+}
+
+/// Where the diagnosis does not have the true effect: all effects that it has, at their typical size.
+fn stand_ins(
+    planned: &Planned,
+    without: &[String],
+    scenario: &Scenario,
+) -> Result<Vec<EffectSetting>, WithheldError> {
+    if !matches!(planned.kind, Kind::Deleted | Kind::OutOfLibrary) {
+        return Ok(Vec::new());
+    }
+    let mut names = draw::names(true);
+    names.retain(|name| !without.iter().any(|w| w == name));
+    names.into_iter().map(|name| draw::typical(name, scenario)).collect()
 }
 
 /// An effect with its size in the library's terms.

@@ -195,11 +195,9 @@ pub(crate) fn sized(
     random: &mut ChaCha8Rng,
 ) -> Result<EffectSetting, WithheldError> {
     let spec = effect_spec(name)?;
-    let small = scenario.car.wheelbase_m() < 1.0;
     let factor = random.random_range(0.25_f64.ln()..2.0_f64.ln()).exp();
     let sign = if ONE_SIGN.contains(&name) || random.random_bool(0.5) { 1.0 } else { -1.0 };
-    let mut values: Vec<f64> =
-        spec.parameters.iter().map(|p| if small { p.typical_small } else { p.typical }).collect();
+    let mut values: Vec<f64> = typical_values(spec, scenario);
     for (value, parameter) in values.iter_mut().zip(spec.parameters) {
         if let Some(null) = parameter.null {
             *value = null + sign * factor * (*value - null);
@@ -219,6 +217,16 @@ pub(crate) fn sized(
         _ => {}
     }
     Ok(EffectSetting::new(name, &values)?)
+}
+
+/// An effect at its typical size for a car.
+pub(crate) fn typical(name: &str, scenario: &Scenario) -> Result<EffectSetting, WithheldError> {
+    Ok(EffectSetting::new(name, &typical_values(effect_spec(name)?, scenario))?)
+}
+
+fn typical_values(spec: &EffectSpec, scenario: &Scenario) -> Vec<f64> {
+    let small = scenario.car.wheelbase_m() < 1.0;
+    spec.parameters.iter().map(|p| if small { p.typical_small } else { p.typical }).collect()
 }
 
 fn lap_m(scenario: &Scenario) -> Result<f64, WithheldError> {

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
+use gripsight_reference_car::effect_spec;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -55,6 +56,9 @@ pub struct OracleFit {
     pub size_ratio: f64,
     /// Squared response that neither tires nor start states imitate, over the noise, per residual.
     pub chi2_per_residual: f64,
+    /// What the best remaining effect of the library would leave of it, in the same measure; for effects that the diagnosis
+    /// does not have.
+    pub excess_without: Option<f64>,
 }
 
 /// An effect at work.
@@ -68,6 +72,14 @@ pub struct SealedEffect {
     pub library_parameters: BTreeMap<String, f64>,
     /// The generator's own fit; none for recorded and foreign drives.
     pub oracle: Option<OracleFit>,
+}
+
+/// The first parameter that sizes an effect, with its constant.
+#[must_use]
+pub fn sizing_parameter(effect: &SealedEffect) -> Option<(&'static str, f64)> {
+    let spec = effect_spec(&effect.name).ok()?;
+    let parameter = spec.parameters.iter().find(|p| p.null.is_some())?;
+    Some((parameter.name, *effect.parameters.get(parameter.name)?))
 }
 
 /// Who drove.

@@ -19,6 +19,6 @@ pub use draw::Pool;
 pub use error::WithheldError;
 pub use journal::Journal;
 pub use label::{
-    COMMITMENT, CaseLabel, Family, Kind, Labels, OracleFit, SealedEffect, sha256_hex,
+    COMMITMENT, CaseLabel, Family, Kind, Labels, OracleFit, SealedEffect, sha256_hex, sizing_parameter,
 };
 pub use oracle::{TIRE_TRUST, oracle_fits};

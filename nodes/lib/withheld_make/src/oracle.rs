@@ -12,6 +12,9 @@
 //! size ratio: 1 + a(m), the noise-free best fit over the mechanism's size; severity: 1/(5 standard errors)
 //! ```
 //!
+//! For an effect that the diagnosis has to do without, copies with every other effect of the library drive along; the best of
+//! them, its size and the tires fitted to `e`, leaves the excess that is sealed with the label.
+//!
 //! This is the fit of the candidate to the plant's response, linear about the true size, with the plant's own mechanism as
 //! the candidate: the mechanisms' constants are the library's (the reference car's README names the four that need a word).
 
@@ -44,11 +47,16 @@ const COLOURED_INFLATION: f64 = 2.2;
 /// One report of odometry and inertial unit.
 type Report = [f64; CHANNELS];
 
-/// Fits every effect of `asked` on a drive of the scenario, which holds them and the background.
+/// Fits every effect of `asked` on a drive of the scenario, which holds them and the background, and says what the best of the
+/// `stand_ins` (other effects, of any size) would leave of the first.
 ///
 /// # Errors
 /// [`WithheldError::ReferenceCar`].
-pub fn oracle_fits(scenario: &Scenario, asked: &[EffectSetting]) -> Result<Vec<OracleFit>, WithheldError> {
+pub fn oracle_fits(
+    scenario: &Scenario,
+    asked: &[EffectSetting],
+    stand_ins: &[EffectSetting],
+) -> Result<Vec<OracleFit>, WithheldError> {
     let names: Vec<&str> = asked.iter().map(|e| e.name.as_str()).collect();
     let exact = |scenario: Scenario| {
         let camera_off = SensorSettings::exact();
@@ -69,6 +77,11 @@ pub fn oracle_fits(scenario: &Scenario, asked: &[EffectSetting]) -> Result<Vec<O
     }
     for name in &names {
         copies.push(exact(without(&|other| other == *name))?);
+    }
+    for stand_in in stand_ins {
+        let mut copy = bare.clone();
+        copy.effects.retain(|own| own.name != stand_in.name);
+        copies.push(exact(copy.effect(stand_in.clone()))?);
     }
     let reports = drive_beside(exact(scenario.clone())?, copies);
     Ok(fits(scenario, &reports, asked.len()))
@@ -161,6 +174,7 @@ fn noise(scenario: &Scenario, mean_speed_mps: f64) -> [[f64; CHANNELS]; 2] {
 struct Window {
     responses: DMatrix<f64>,
     background: DVector<f64>,
+    stand_ins: Vec<DVector<f64>>,
 }
 
 fn fits(scenario: &Scenario, reports: &[Vec<Report>], effects: usize) -> Vec<OracleFit> {
@@ -178,13 +192,20 @@ fn fits(scenario: &Scenario, reports: &[Vec<Report>], effects: usize) -> Vec<Ora
             let starts = orthonormal(starts);
             let tires = (5..5 + TIRES).map(|i| column(&reports[i], bare, TIRE_STEP));
             let left_out = (5 + TIRES..5 + TIRES + effects).map(|i| column(car, &reports[i], 1.0));
+            let stand_ins = reports.iter().skip(5 + TIRES + effects);
+            let stand_ins = stand_ins.map(|r| without_starts(column(r, bare, 1.0), &starts)).collect();
             let columns: Vec<DVector<f64>> =
                 left_out.chain(tires).map(|c| without_starts(c, &starts)).collect();
             let background = without_starts(column(bare, &reports[4], 1.0), &starts);
-            Window { responses: DMatrix::from_columns(&columns), background }
+            Window { responses: DMatrix::from_columns(&columns), background, stand_ins }
         })
         .collect();
-    (0..effects).map(|effect| fit(&windows, effects, effect, &white, &coloured)).collect()
+    let mut fits: Vec<OracleFit> =
+        (0..effects).map(|effect| fit(&windows, effects, effect, &white, &coloured)).collect();
+    if let Some(first) = fits.first_mut() {
+        first.excess_without = excess(&windows, effects);
+    }
+    fits
 }
 
 /// The difference of two lists of reports, channel by channel, over step and noise.
@@ -222,7 +243,8 @@ fn fit(
     white: &[f64; CHANNELS],
     coloured: &[f64; CHANNELS],
 ) -> OracleFit {
-    let nothing = OracleFit { severity: 0.0, size_ratio: 1.0, chi2_per_residual: 0.0 };
+    let nothing =
+        OracleFit { severity: 0.0, size_ratio: 1.0, chi2_per_residual: 0.0, excess_without: None };
     let mut information = DMatrix::zeros(effects + TIRES, effects + TIRES);
     for i in effects..effects + TIRES {
         information[(i, i)] = TIRE_TRUST.powi(-2);
@@ -255,5 +277,31 @@ fn fit(
         severity: 1.0 / (DETECTION * variance.sqrt()),
         size_ratio: 1.0 + bias,
         chi2_per_residual: own / residuals,
+        excess_without: None,
     }
+}
+
+/// What the best stand-in, with other tires, leaves of the first effect's response: squared, over the noise, per residual.
+fn excess(windows: &[Window], effects: usize) -> Option<f64> {
+    let stand_ins = windows.first()?.stand_ins.len();
+    let residuals = (windows.len() * WINDOW * CHANNELS) as f64;
+    let left = (0..stand_ins).map(|s| {
+        let mut information = DMatrix::zeros(1 + TIRES, 1 + TIRES);
+        for i in 1..=TIRES {
+            information[(i, i)] = TIRE_TRUST.powi(-2);
+        }
+        let (mut moment, mut whole) = (DVector::zeros(1 + TIRES), 0.0);
+        for window in windows {
+            let response = window.responses.column(0);
+            let mut columns = window.responses.columns(effects - 1, 1 + TIRES).clone_owned();
+            columns.set_column(0, &window.stand_ins[s]);
+            information += columns.tr_mul(&columns);
+            moment += columns.tr_mul(&response);
+            whole += response.norm_squared();
+        }
+        // Both columns may be nought: an effect that this drive does not excite at all.
+        information[(0, 0)] += 1e-12;
+        information.try_inverse().map_or(whole, |inverse| whole - moment.dot(&(&inverse * &moment))) / residuals
+    });
+    left.filter(|l| l.is_finite()).reduce(f64::min)
 }

@@ -1,0 +1,146 @@
+//! `gripsight withheld score`: the labels opened, verdicts scored.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use clap::Args;
+use gripsight_withheld_make::{CaseLabel, Family, Kind, Labels, files};
+use gripsight_withheld_score::{Answer, Control, Outside, Said, Scores, Targets, control};
+use indicatif::{ParallelProgressIterator as _, ProgressBar, ProgressStyle};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::case::{Case, cases, gap_json, said, write_whole};
+use super::diagnose::{About, Timing};
+use crate::Outcome;
+use crate::invocation::invocation;
+
+/// Open the labels of a batch and score the verdicts on it.
+///
+/// The label file is checked against DIR/commitment.txt first. Each case that the targets speak of is then diagnosed once more with
+/// the names of its effects given (the oracle), unless --no-oracle. REPORT receives report.html, score.json, answers.jsonl and score.txt.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLE)]
+pub(crate) struct ScoreArgs {
+    /// The batch that `withheld make` wrote.
+    dir: PathBuf,
+    /// What `withheld diagnose` said of it.
+    verdicts: PathBuf,
+    /// The label file.
+    #[arg(long, value_name = "FILE")]
+    labels: PathBuf,
+    /// Do without the oracle: no shrinkage beside it.
+    #[arg(long)]
+    no_oracle: bool,
+    /// Where the files go; made if it is not there.
+    #[arg(long, value_name = "REPORT")]
+    out: PathBuf,
+}
+
+const EXAMPLE: &str = "\
+Example:
+  gripsight withheld score cases verdicts --labels labels.json --out report";
+
+/// What score.json holds.
+#[derive(Serialize)]
+struct File<'a> {
+    about: &'a About,
+    command: String,
+    settings: &'a BTreeMap<String, serde_json::Value>,
+    seed: u64,
+    scores: &'a Scores,
+}
+
+/// Runs the subcommand.
+pub(crate) fn run(args: &ScoreArgs) -> anyhow::Result<Outcome> {
+    let labels = Labels::open(&args.labels, &args.dir)?;
+    let about = About::read(&args.verdicts)?;
+    let names = cases(&args.dir)?;
+    if names.len() != labels.cases.len() {
+        bail!("{} cases, but labels of {}", names.len(), labels.cases.len());
+    }
+    fs::create_dir_all(&args.out).with_context(|| format!("cannot make {}", args.out.display()))?;
+    let targets = Targets::fixed()?;
+    let mut answers =
+        labels.cases.iter().map(|label| answer(label, &args.verdicts)).collect::<anyhow::Result<Vec<_>>>()?;
+    if !args.no_oracle {
+        ask_oracle(&mut answers, &targets, args)?;
+    }
+    let scores = Scores::of(&answers, controls(&answers, &args.dir)?, targets);
+    let file = File {
+        about: &about,
+        command: invocation(std::env::args()),
+        settings: &labels.settings,
+        seed: labels.seed,
+        scores: &scores,
+    };
+    let lines = answers.iter().map(|a| Ok(serde_json::to_string(a)? + "\n"));
+    let text = scores.text();
+    write_whole(&args.out.join("answers.jsonl"), &lines.collect::<anyhow::Result<String>>()?)?;
+    write_whole(&args.out.join("score.json"), &(serde_json::to_string_pretty(&file)? + "\n"))?;
+    write_whole(&args.out.join("score.txt"), &text)?;
+    print!("{text}");
+    println!("files: {} (score.txt, score.json, answers.jsonl)", args.out.display());
+    Ok(Outcome::Done)
+}
+
+fn answer(label: &CaseLabel, verdicts: &Path) -> anyhow::Result<Answer> {
+    let folder = verdicts.join(&label.case);
+    let timing = folder.join("timing.json");
+    let text = fs::read_to_string(&timing)
+        .with_context(|| format!("{} is not diagnosed; call `withheld diagnose` again", label.case))?;
+    let timing: Timing =
+        serde_json::from_str(&text).with_context(|| format!("cannot use {}", timing.display()))?;
+    Ok(Answer {
+        label: label.clone(),
+        said: said(&folder.join("gap.json"))?,
+        oracle: None,
+        baselines: BTreeMap::new(),
+        time_s: timing.diagnosing_s,
+    })
+}
+
+/// Diagnoses once more with the true names given where shrinkage is compared; what was asked before is read.
+fn ask_oracle(answers: &mut [Answer], targets: &Targets, args: &ScoreArgs) -> anyhow::Result<()> {
+    let kept = args.out.join("oracle");
+    fs::create_dir_all(&kept).with_context(|| format!("cannot make {}", kept.display()))?;
+    let asked: Vec<&mut Answer> = answers
+        .iter_mut()
+        .filter(|a| matches!(a.label.kind, Kind::Single | Kind::Pair) && a.in_scope(targets))
+        .collect();
+    let bar = ProgressBar::new(asked.len() as u64)
+        .with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} oracle runs, {eta} left")?);
+    asked.into_par_iter().progress_with(bar).try_for_each(|answer| -> anyhow::Result<()> {
+        let path = kept.join(format!("{}.json", answer.label.case));
+        if !path.exists() {
+            let only: Vec<String> = answer.label.effects.iter().map(|e| e.name.clone()).collect();
+            let case = Case::read(&args.dir.join(&answer.label.case))?;
+            write_whole(&path, &serde_json::to_string(&serde_json::from_str::<Said>(&gap_json(
+                &case.diagnose(&only),
+            )?)?)?)?;
+        }
+        answer.oracle = Some(said(&path)?);
+        Ok(())
+    })
+}
+
+/// The control by family: sizes of files, counts and stamps of messages, place in the order.
+fn controls(answers: &[Answer], dir: &Path) -> anyhow::Result<BTreeMap<String, Control>> {
+    let mut by_family: BTreeMap<Family, Vec<Outside>> = BTreeMap::new();
+    for (place, answer) in answers.iter().enumerate() {
+        let folder = dir.join(&answer.label.case);
+        let mut figures = vec![place as f64];
+        for name in [files::BAG, files::HELD_OUT] {
+            let info = gripsight_bag::info(&folder.join(name), &gripsight_bag::TopicMap::default())?;
+            figures.extend([info.size_bytes as f64, info.duration_s, info.messages as f64]);
+            figures.extend(info.topics.iter().flat_map(|t| [t.messages as f64, t.longest_step_s]));
+        }
+        for name in [files::VEHICLE, files::TIRES, files::WITHOUT] {
+            figures.push(fs::metadata(folder.join(name)).map_or(0.0, |m| m.len() as f64));
+        }
+        by_family.entry(answer.label.family).or_default().push(Outside { kind: answer.label.kind, figures });
+    }
+    Ok(by_family.into_iter().map(|(family, own)| (family.name().to_owned(), control(&own))).collect())
+}

@@ -1,0 +1,20 @@
+//! The blind check's arithmetic: verdicts ([`Said`]) beside labels make [`Answer`]s, and all answers make [`Scores`].
+//!
+//! Every rate carries its 95 % Wilson interval ([`Rate`]). Targets and thresholds, with the day they were fixed, are in `targets.json`.
+
+mod calibration;
+mod control;
+mod judge;
+mod rate;
+mod scores;
+mod targets;
+mod text;
+mod verdict;
+
+pub use calibration::{Calibration, CalibrationBin};
+pub use control::{Control, Outside, control};
+pub use judge::{Answer, SizeCheck};
+pub use rate::{Rate, median};
+pub use scores::{EffectScore, FamilyScore, Line, Miss, SEVERITY_BANDS, Scores};
+pub use targets::Targets;
+pub use verdict::{Figure, Said, SaidEffect, SaidGap, SaidParameter};

@@ -1,0 +1,93 @@
+//! What a diagnosis said of a case: the parts of gap.json that are scored.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// A parameter with its 90 % interval; an end that is not there is `null`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SaidParameter {
+    /// Best value.
+    pub value: Option<f64>,
+    /// Lower end.
+    pub low: Option<f64>,
+    /// Upper end.
+    pub high: Option<f64>,
+}
+
+/// An effect in the ranking.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SaidEffect {
+    /// Canonical name.
+    pub name: String,
+    /// Whether the verdict names it.
+    pub accepted: bool,
+    /// Sizes by name.
+    pub parameters: BTreeMap<String, SaidParameter>,
+    /// Stated chance that it is the cause.
+    pub confidence: Option<f64>,
+    /// What the data cannot tell from it.
+    pub confused_with: Vec<String>,
+}
+
+/// A figure of the budget.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Figure {
+    /// Best value.
+    pub value: Option<f64>,
+}
+
+/// The gap on the held-out bag, step by step.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct SaidGap {
+    /// The model as handed over.
+    pub nominal: Figure,
+    /// With other tires.
+    pub retuned: Figure,
+    /// With the effects.
+    pub after: Figure,
+    /// With flexible terms.
+    pub unstructured_ceiling: Figure,
+    /// What noise leaves.
+    pub noise_floor: Figure,
+}
+
+/// A verdict.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Said {
+    /// `effects`, `tire_retune_only`, `no_gap`, `none_of_these`, `not_identifiable`; or `failed`.
+    pub verdict: String,
+    /// Effects, best first.
+    #[serde(default)]
+    pub effects: Vec<SaidEffect>,
+    /// The gap.
+    #[serde(default)]
+    pub gap: SaidGap,
+}
+
+impl Said {
+    /// Names that the verdict gives, in its order.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.accepted().map(|e| e.name.as_str())
+    }
+
+    /// Effects that the verdict names.
+    pub fn accepted(&self) -> impl Iterator<Item = &SaidEffect> {
+        let naming = self.verdict == "effects";
+        self.effects.iter().filter(move |e| naming && e.accepted)
+    }
+
+    /// The first name, or the verdict where it gives none.
+    #[must_use]
+    pub fn first(&self) -> &str {
+        self.names().next().unwrap_or(&self.verdict)
+    }
+
+    /// Share of the gap above the noise that is gone on the held-out bag, tires and effects together.
+    #[must_use]
+    pub fn shrinkage(&self) -> Option<f64> {
+        let (nominal, after, floor) =
+            (self.gap.nominal.value?, self.gap.after.value?, self.gap.noise_floor.value?);
+        (nominal > floor).then(|| (nominal - after) / (nominal - floor))
+    }
+}
