@@ -6,7 +6,7 @@ use std::sync::Mutex;
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
-use gripsight_withheld_make::{Batch, BatchSettings, COMMITMENT, Journal, Pool};
+use gripsight_withheld_make::{Batch, BatchSettings, COMMITMENT, Journal, MeasuredDrives, Pool};
 use indicatif::{ParallelProgressIterator as _, ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
@@ -32,6 +32,19 @@ pub(crate) struct MakeArgs {
     /// Length of every bag in seconds.
     #[arg(long, value_name = "S", default_value_t = 24.0, value_parser = duration)]
     duration: f64,
+    /// Drives of plants that others wrote, a folder each (tests/plants/make_foreign_bags.py makes them); effects of sensors and
+    /// actuators are put in.
+    #[arg(long, value_name = "DIR", requires = "foreign_cases")]
+    foreign: Option<PathBuf>,
+    /// Cases of them.
+    #[arg(long, value_name = "N", requires = "foreign")]
+    foreign_cases: Option<usize>,
+    /// Recorded bags, a folder each with the .mcap file and vehicle.yaml; effects of sensors and actuators are put in.
+    #[arg(long, value_name = "DIR", requires = "recorded_cases")]
+    recorded: Option<PathBuf>,
+    /// Cases of them.
+    #[arg(long, value_name = "N", requires = "recorded")]
+    recorded_cases: Option<usize>,
     /// Where the cases go; made if it is not there.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -79,8 +92,10 @@ pub(crate) fn run(args: &MakeArgs) -> anyhow::Result<Outcome> {
         seed,
         pool,
         duration_s: args.duration,
+        foreign: drives(args.foreign.as_ref(), args.foreign_cases),
+        recorded: drives(args.recorded.as_ref(), args.recorded_cases),
     })?;
-    let batch = Batch::new(settings);
+    let batch = Batch::new(settings)?;
     let waiting: Vec<usize> = (0..batch.len())
         .filter(|&i| {
             let case = batch.case_name(i);
@@ -104,6 +119,10 @@ pub(crate) fn run(args: &MakeArgs) -> anyhow::Result<Outcome> {
     println!("{}: {} cases", args.out.display(), batch.len());
     println!("{}: sealed, SHA-256 {hash}", args.labels.display());
     Ok(Outcome::Done)
+}
+
+fn drives(folder: Option<&PathBuf>, cases: Option<usize>) -> Option<MeasuredDrives> {
+    Some(MeasuredDrives { folder: folder?.clone(), cases: cases? })
 }
 
 fn same_folder(a: &std::path::Path, b: &std::path::Path) -> bool {

@@ -126,6 +126,9 @@ fn ask_oracle(answers: &mut [Answer], targets: &Targets, args: &ScoreArgs) -> an
     })
 }
 
+/// The topics of a case's bags.
+const TOPICS: [&str; 4] = ["/car_state/odom", "/drive", "/imu/data", "/wheel_speeds"];
+
 /// The control by family: sizes of files, counts and stamps of messages, place in the order.
 fn controls(answers: &[Answer], dir: &Path) -> anyhow::Result<BTreeMap<String, Control>> {
     let mut by_family: BTreeMap<Family, Vec<Outside>> = BTreeMap::new();
@@ -135,7 +138,11 @@ fn controls(answers: &[Answer], dir: &Path) -> anyhow::Result<BTreeMap<String, C
         for name in [files::BAG, files::HELD_OUT] {
             let info = gripsight_bag::info(&folder.join(name), &gripsight_bag::TopicMap::default())?;
             figures.extend([info.size_bytes as f64, info.duration_s, info.messages as f64]);
-            figures.extend(info.topics.iter().flat_map(|t| [t.messages as f64, t.longest_step_s]));
+            // Drives may lack a stream; every case has the same figures.
+            for topic in TOPICS {
+                let found = info.topics.iter().find(|t| t.name == topic);
+                figures.extend(found.map_or([0.0, 0.0], |t| [t.messages as f64, t.longest_step_s]));
+            }
         }
         for name in [files::VEHICLE, files::TIRES, files::WITHOUT] {
             figures.push(fs::metadata(folder.join(name)).map_or(0.0, |m| m.len() as f64));

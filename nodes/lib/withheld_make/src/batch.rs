@@ -6,12 +6,14 @@ use std::path::Path;
 
 use gripsight_reference_car::{EffectSetting, Scenario, effect_spec};
 use rand::SeedableRng;
+use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::draw::{self, Drive, Pool};
-use crate::label::{CaseLabel, Kind, Labels, OracleFit, SealedEffect};
+use crate::label::{CaseLabel, Family, Kind, Labels, OracleFit, SealedEffect};
+use crate::measured::{self, MeasuredDrive, MeasuredDrives};
 use crate::oracle::oracle_fits;
 use crate::plan::{self, Planned};
 use crate::{WithheldError, drive, tires};
@@ -44,6 +46,10 @@ pub struct BatchSettings {
     pub pool: Pool,
     /// Length of every bag.
     pub duration_s: f64,
+    /// Drives of plants that others wrote.
+    pub foreign: Option<MeasuredDrives>,
+    /// Recorded bags.
+    pub recorded: Option<MeasuredDrives>,
 }
 
 /// A batch as it is planned. Cases can be made in any order.
@@ -51,14 +57,30 @@ pub struct BatchSettings {
 pub struct Batch {
     settings: BatchSettings,
     plan: Vec<Planned>,
+    foreign: Vec<MeasuredDrive>,
+    recorded: Vec<MeasuredDrive>,
 }
 
 impl Batch {
-    /// Plans a batch.
-    #[must_use]
-    pub fn new(settings: BatchSettings) -> Self {
-        let plan = plan::reference(settings.cases, &mut ChaCha8Rng::seed_from_u64(settings.seed));
-        Self { settings, plan }
+    /// Plans a batch, and reads the drives that others made.
+    ///
+    /// # Errors
+    /// [`WithheldError`] names the drive that cannot be used.
+    pub fn new(settings: BatchSettings) -> Result<Self, WithheldError> {
+        let random = &mut ChaCha8Rng::seed_from_u64(settings.seed);
+        let mut plan = plan::reference(settings.cases, random);
+        let mut drives = |asked: &Option<MeasuredDrives>, family| match asked {
+            Some(MeasuredDrives { folder, cases }) => {
+                let drives = measured::read(folder, family == Family::Foreign)?;
+                plan.extend(plan::measured(family, *cases, drives.len(), random));
+                Ok::<_, WithheldError>(drives)
+            }
+            None => Ok(Vec::new()),
+        };
+        let foreign = drives(&settings.foreign, Family::Foreign)?;
+        let recorded = drives(&settings.recorded, Family::Recorded)?;
+        plan.shuffle(random);
+        Ok(Self { settings, plan, foreign, recorded })
     }
 
     /// What it is made of.
@@ -110,7 +132,11 @@ impl Batch {
         }
         fs::create_dir_all(&part).map_err(WithheldError::io(&part))?;
         let planned = &self.plan[index];
-        let label = self.reference_case(case.clone(), planned, &part, &mut random)?;
+        let label = match planned.family {
+            Family::Reference => self.reference_case(case.clone(), planned, &part, &mut random),
+            Family::Foreign => self.measured_case(case.clone(), planned, &self.foreign, &part, &mut random),
+            Family::Recorded => self.measured_case(case.clone(), planned, &self.recorded, &part, &mut random),
+        }?;
         let whole = folder.join(&case);
         if whole.exists() {
             fs::remove_dir_all(&whole).map_err(WithheldError::io(&whole))?;
@@ -131,10 +157,11 @@ impl Batch {
         for _ in 0..TRIES {
             let Drive { mut scenario, race_pace, circumstances } =
                 draw::drive(self.settings.pool, run_s, random)?;
+            let lap_m = draw::lap_m(&scenario)?;
             let asked = planned
                 .effects
                 .iter()
-                .map(|name| draw::sized(name, &scenario, random))
+                .map(|name| draw::sized(name, scenario.car.wheelbase_m() < 1.0, lap_m, random))
                 .collect::<Result<Vec<_>, _>>()?;
             scenario.effects.retain(|own| asked.iter().all(|a| a.name != own.name));
             scenario.effects.extend(asked.iter().cloned());
@@ -175,6 +202,52 @@ impl Batch {
         }
         let last = last.unwrap_or(gripsight_reference_car::EndReason::Completed);
         Err(WithheldError::NoDrive { tries: TRIES, last })
+    }
+}
+
+impl Batch {
+    fn measured_case(
+        &self,
+        case: String,
+        planned: &Planned,
+        drives: &[MeasuredDrive],
+        folder: &Path,
+        random: &mut ChaCha8Rng,
+    ) -> Result<CaseLabel, WithheldError> {
+        let drive = &drives[planned.source];
+        // An effect on a stream that this drive lacks gives way to another one.
+        let mut names = planned.effects.clone();
+        let (asked, effects) = loop {
+            let asked = names
+                .iter()
+                .map(|name| draw::sized(name, drive.wheelbase_m < 1.0, 0.0, random))
+                .collect::<Result<Vec<_>, _>>()?;
+            let effects = asked.iter().map(measured::effect).collect::<Result<Vec<_>, _>>()?;
+            if effects.iter().all(|e| drive.takes(e)) {
+                break (asked, effects);
+            }
+            names = draw::some(&plan::injectable(), names.len(), random);
+        };
+        let planned = Planned { effects: names, ..planned.clone() };
+        let without = left_out(&planned, random);
+        let [first, second] = drive.stretches(&effects, self.settings.duration_s, random)?;
+        drive::write(&folder.join(files::BAG), &first)?;
+        drive::write(&folder.join(files::HELD_OUT), &second)?;
+        text(&folder.join(files::VEHICLE), &drive.vehicle)?;
+        if let Some(axles) = drive.axles {
+            text(&folder.join(files::TIRES), &tires::file(tires::off_by_a_little(axles, random)))?;
+        }
+        text(&folder.join(files::WITHOUT), &(without.join("\n") + "\n"))?;
+        Ok(CaseLabel {
+            case,
+            family: planned.family,
+            kind: planned.kind,
+            effects: asked.into_iter().map(|setting| sealed(setting, None)).collect::<Result<_, _>>()?,
+            without,
+            race_pace: true,
+            contained: drive.contained.clone(),
+            circumstances: [("car".to_owned(), Value::from(drive.name.clone()))].into(),
+        })
     }
 }
 

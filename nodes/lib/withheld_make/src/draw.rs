@@ -177,6 +177,11 @@ pub(crate) fn names(in_library: bool) -> Vec<&'static str> {
     EFFECTS.iter().filter(|e| e.in_library == in_library).map(|e| e.name).collect()
 }
 
+/// So many names, one or two.
+pub(crate) fn some<'a>(names: &[&'a str], count: usize, random: &mut ChaCha8Rng) -> Vec<&'a str> {
+    if count == 2 { pair(names, random) } else { names.sample(random, count).copied().collect() }
+}
+
 /// Two names that are not one thing by construction.
 pub(crate) fn pair<'a>(names: &[&'a str], random: &mut ChaCha8Rng) -> Vec<&'a str> {
     loop {
@@ -188,16 +193,17 @@ pub(crate) fn pair<'a>(names: &[&'a str], random: &mut ChaCha8Rng) -> Vec<&'a st
     }
 }
 
-/// An effect with a drawn size, for a car on a track.
+/// An effect with a drawn size, for a 1:10 or a larger car on a lap of some length.
 pub(crate) fn sized(
     name: &str,
-    scenario: &Scenario,
+    small: bool,
+    lap_m: f64,
     random: &mut ChaCha8Rng,
 ) -> Result<EffectSetting, WithheldError> {
     let spec = effect_spec(name)?;
     let factor = random.random_range(0.25_f64.ln()..2.0_f64.ln()).exp();
     let sign = if ONE_SIGN.contains(&name) || random.random_bool(0.5) { 1.0 } else { -1.0 };
-    let mut values: Vec<f64> = typical_values(spec, scenario);
+    let mut values = typical_values(spec, small);
     for (value, parameter) in values.iter_mut().zip(spec.parameters) {
         if let Some(null) = parameter.null {
             *value = null + sign * factor * (*value - null);
@@ -207,7 +213,6 @@ pub(crate) fn sized(
         // The slower the servo, the stronger the effect.
         "steering_rate_limit" => values.iter_mut().for_each(|rate| *rate /= factor),
         "low_grip_patch" => {
-            let lap_m = lap_m(scenario)?;
             values = vec![
                 (values.first().copied().unwrap_or(0.0)).min(0.6),
                 lap_m * random.random_range(0.1..0.5),
@@ -221,15 +226,16 @@ pub(crate) fn sized(
 
 /// An effect at its typical size for a car.
 pub(crate) fn typical(name: &str, scenario: &Scenario) -> Result<EffectSetting, WithheldError> {
-    Ok(EffectSetting::new(name, &typical_values(effect_spec(name)?, scenario))?)
+    let small = scenario.car.wheelbase_m() < 1.0;
+    Ok(EffectSetting::new(name, &typical_values(effect_spec(name)?, small))?)
 }
 
-fn typical_values(spec: &EffectSpec, scenario: &Scenario) -> Vec<f64> {
-    let small = scenario.car.wheelbase_m() < 1.0;
+fn typical_values(spec: &EffectSpec, small: bool) -> Vec<f64> {
     spec.parameters.iter().map(|p| if small { p.typical_small } else { p.typical }).collect()
 }
 
-fn lap_m(scenario: &Scenario) -> Result<f64, WithheldError> {
+/// Length of the scenario's lap.
+pub(crate) fn lap_m(scenario: &Scenario) -> Result<f64, WithheldError> {
     match &scenario.course {
         Course::Track { name, reversed } => {
             Ok(Track::by_name(name, scenario.car.track_scale, *reversed)?.length_m())

@@ -10,6 +10,7 @@ mod drive;
 mod error;
 mod journal;
 mod label;
+mod measured;
 mod oracle;
 mod plan;
 mod tires;
@@ -21,4 +22,5 @@ pub use journal::Journal;
 pub use label::{
     COMMITMENT, CaseLabel, Family, Kind, Labels, OracleFit, SealedEffect, sha256_hex, sizing_parameter,
 };
+pub use measured::MeasuredDrives;
 pub use oracle::{TIRE_TRUST, oracle_fits};
