@@ -5,10 +5,12 @@ Plants: `slipx` (1:10 double track with relaxation, load sensitivity, combined s
 of `commonroad-vehicle-models` (Ford Escort, BMW 320i). Packages: nodes/lib/reference_car/compare/requirements.txt.
 
     make_foreign_bags.py OUT [--only NAME ...] [--duration S]
+    make_foreign_bags.py OUT --draw N --seed S [--duration S]
 
-For every drive NAME of the table at the end: OUT/NAME/NAME.mcap (nav_msgs/Odometry, ackermann_msgs/AckermannDriveStamped,
+For every drive NAME of the table at the end, or for N drives whose plant, track, friction and pace are drawn (for
+`gripsight withheld make --foreign OUT`): OUT/NAME/NAME.mcap (nav_msgs/Odometry, ackermann_msgs/AckermannDriveStamped,
 sensor_msgs/Imu, 100 Hz), OUT/NAME/truth_axle_forces.csv (at the odometry's stamps), OUT/NAME/vehicle.yaml, and
-OUT/NAME/about.json. Same packages, same bytes.
+OUT/NAME/about.json with the effects that the plant contains by its equations. Same packages, same bytes.
 
 Drive command: for slipx `steering_angle` is the command (the servo's lag is the plant's), for the multibody car the angle
 of the road wheels. `acceleration` is the longitudinal force asked of the tires over the mass.
@@ -105,6 +107,10 @@ class Slipx:
     """The 1:10 car at its most detailed tier, its friction scaled to `mu`."""
 
     steering_is = "command; the servo's lag is in the plant"
+    contained = [
+        "combined_slip", "lateral_load_transfer", "longitudinal_load_transfer", "rolling_resistance", "aero_drag",
+        "steering_delay", "steering_lag", "steering_rate_limit", "tire_relaxation",
+    ]
     # It brakes and drives with the rear axle alone.
     a_x_share = 0.2
 
@@ -152,6 +158,8 @@ class Multibody:
     """A multibody passenger car, its tires' peak friction scaled to `mu`, stiffness unchanged."""
 
     steering_is = "angle of the road wheels"
+    # Springs, roll centres and camber make the rear axle steer and thrust with roll; there is no relaxation and no servo.
+    contained = ["combined_slip", "lateral_load_transfer", "longitudinal_load_transfer", "roll_steer"]
     a_x_share = 0.4
 
     def __init__(self, parameters, mu):
@@ -321,7 +329,7 @@ def record(out, name, plant, track_name, reverse, mu, pace, seed, duration_s, di
     data = np.array([r[1:] for r in rows])
     use = np.abs(data[:, :2] / data[:, 2:4]).max(axis=0)
     about = dict(track=track_name, reverse=reverse, mu=mu, pace=pace, seed=seed, duration_s=duration_s,
-                 steering_angle=plant.steering_is, noise_standard_deviations=noise,
+                 steering_angle=plant.steering_is, contained=plant.contained, noise_standard_deviations=noise,
                  largest_f_y_over_f_z=dict(front=round(float(use[0]), 3), rear=round(float(use[1]), 3)))
     (folder / "about.json").write_text(json.dumps(about, indent=2) + "\n")
     print(f"{name}: F_y/F_z up to {use[0]:.2f} front, {use[1]:.2f} rear; off the line by {worst:.1f} wheelbases")
@@ -339,12 +347,51 @@ DRIVES = [
 ]
 
 
+
+
+def drawn(number, seed):
+    """Rows as in DRIVES: every second one slipx, the others the two passenger cars in turn."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for place in range(number):
+        kind = ("slipx", "bmw", "slipx", "ford")[place % 4]
+        mu = float(rng.uniform(0.7, 1.1) if kind == "slipx" else rng.uniform(0.55, 0.95))
+        build = {
+            "slipx": lambda mu=mu: Slipx(mu),
+            "bmw": lambda mu=mu: Multibody(bmw, mu),
+            "ford": lambda mu=mu: Multibody(ford, mu),
+        }[kind]
+        track = str(rng.choice(list(TRACKS)))
+        pace = float(rng.uniform(0.72, 0.84) if kind == "slipx" else rng.uniform(0.70, 0.80))
+        dither = 0.02 if kind == "slipx" else 0.004
+        rows.append((f"{kind}_{place:02d}", build, track, bool(rng.integers(2)), mu, pace, int(rng.integers(2**31)), dither))
+    return rows
+
+
+def drive_slower(out, row, duration):
+    """Records a drive; one that leaves the track is driven again at a lower pace."""
+    name, build, track, reverse, mu, pace, seed, dither = row
+    for _ in range(4):
+        try:
+            return record(out, name, build(), track, reverse, mu, pace, seed, duration, dither)
+        except RuntimeError as error:
+            print(error)
+            pace *= 0.93
+    raise SystemExit(f"{name}: no pace keeps it on the track")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
     parser.add_argument("--only", nargs="+", choices=[d[0] for d in DRIVES])
+    parser.add_argument("--draw", type=int, metavar="N", help="draw N drives instead of the table's")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the draw")
     parser.add_argument("--duration", type=float, default=40.0)
     arguments = parser.parse_args()
+    if arguments.draw is not None:
+        for row in drawn(arguments.draw, arguments.seed):
+            drive_slower(arguments.out, row, arguments.duration)
+        return
     for name, plant, track, reverse, mu, pace, seed, dither in DRIVES:
         if arguments.only is None or name in arguments.only:
             record(arguments.out, name, plant(), track, reverse, mu, pace, seed, arguments.duration, dither)

@@ -1,5 +1,6 @@
 //! A case as the diagnosis gets it.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -9,7 +10,7 @@ use gripsight_gap::{Diagnosis, GapError, Request, diagnose};
 use gripsight_signals::StateSequence;
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 use gripsight_withheld_make::{COMMITMENT, files};
-use gripsight_withheld_score::Said;
+use gripsight_withheld_score::{Said, baselines};
 use serde::Serialize;
 
 use crate::diagnose;
@@ -54,6 +55,16 @@ impl Case {
             only,
         };
         diagnose(&request, &mut |_| {})
+    }
+}
+
+impl Case {
+    /// What simpler methods name first; nothing where no tires were handed over.
+    pub(super) fn baselines(&self) -> anyhow::Result<BTreeMap<String, String>> {
+        match &self.tires {
+            Some(tires) => Ok(baselines(&self.sequence, &self.vehicle, tires)?),
+            None => Ok(BTreeMap::new()),
+        }
     }
 }
 

@@ -58,7 +58,11 @@ impl About {
     pub(super) fn read(verdicts: &Path) -> anyhow::Result<Self> {
         let path = verdicts.join(ABOUT);
         let text = fs::read_to_string(&path).with_context(|| {
-            format!("cannot read {}; is {} what `withheld diagnose` wrote?", path.display(), verdicts.display())
+            format!(
+                "cannot read {}; is {} what `withheld diagnose` wrote?",
+                path.display(),
+                verdicts.display()
+            )
         })?;
         serde_json::from_str(&text).with_context(|| format!("cannot use {}", path.display()))
     }

@@ -6,8 +6,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::Args;
+use gripsight_report::{WithheldInput, withheld_page};
 use gripsight_withheld_make::{CaseLabel, Family, Kind, Labels, files};
-use gripsight_withheld_score::{Answer, Control, Outside, Said, Scores, Targets, control};
+use gripsight_withheld_score::{
+    Answer, Control, Outside, Said, Scores, Targets, control, excuse_what_drives_have,
+};
 use indicatif::{ParallelProgressIterator as _, ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -65,9 +68,16 @@ pub(crate) fn run(args: &ScoreArgs) -> anyhow::Result<Outcome> {
     let targets = Targets::fixed()?;
     let mut answers =
         labels.cases.iter().map(|label| answer(label, &args.verdicts)).collect::<anyhow::Result<Vec<_>>>()?;
+    excuse_what_drives_have(&mut answers);
     if !args.no_oracle {
         ask_oracle(&mut answers, &targets, args)?;
     }
+    answers.par_iter_mut().try_for_each(|answer| -> anyhow::Result<()> {
+        if answer.label.kind == Kind::Single {
+            answer.baselines = Case::read(&args.dir.join(&answer.label.case))?.baselines()?;
+        }
+        Ok(())
+    })?;
     let scores = Scores::of(&answers, controls(&answers, &args.dir)?, targets);
     let file = File {
         about: &about,
@@ -78,11 +88,21 @@ pub(crate) fn run(args: &ScoreArgs) -> anyhow::Result<Outcome> {
     };
     let lines = answers.iter().map(|a| Ok(serde_json::to_string(a)? + "\n"));
     let text = scores.text();
+    let page = withheld_page(&WithheldInput {
+        scores: &scores,
+        batch: &args.dir.file_name().unwrap_or_default().to_string_lossy(),
+        commitment: &about.commitment,
+        tool_version: &about.version,
+        executable_sha256: &about.executable_sha256,
+        seed: labels.seed,
+        command: &file.command,
+    })?;
+    write_whole(&args.out.join("report.html"), &page)?;
     write_whole(&args.out.join("answers.jsonl"), &lines.collect::<anyhow::Result<String>>()?)?;
     write_whole(&args.out.join("score.json"), &(serde_json::to_string_pretty(&file)? + "\n"))?;
     write_whole(&args.out.join("score.txt"), &text)?;
     print!("{text}");
-    println!("files: {} (score.txt, score.json, answers.jsonl)", args.out.display());
+    println!("files: {} (report.html, score.txt, score.json, answers.jsonl)", args.out.display());
     Ok(Outcome::Done)
 }
 
@@ -117,9 +137,10 @@ fn ask_oracle(answers: &mut [Answer], targets: &Targets, args: &ScoreArgs) -> an
         if !path.exists() {
             let only: Vec<String> = answer.label.effects.iter().map(|e| e.name.clone()).collect();
             let case = Case::read(&args.dir.join(&answer.label.case))?;
-            write_whole(&path, &serde_json::to_string(&serde_json::from_str::<Said>(&gap_json(
-                &case.diagnose(&only),
-            )?)?)?)?;
+            write_whole(
+                &path,
+                &serde_json::to_string(&serde_json::from_str::<Said>(&gap_json(&case.diagnose(&only))?)?)?,
+            )?;
         }
         answer.oracle = Some(said(&path)?);
         Ok(())

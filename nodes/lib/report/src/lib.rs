@@ -3,7 +3,8 @@
 //! A page is one HTML file without scripts or references: it opens from a USB stick and prints on two sheets. Pictures are SVG
 //! inside it. Colours have fixed [`Role`]s in every picture.
 //!
-//! [`identification_page`] shows the result of an identification, [`gap_page`] that of a diagnosis. They are built of [`Chart`]s,
+//! [`identification_page`] shows the result of an identification, [`gap_page`] that of a diagnosis,
+//! [`withheld_page`] the score of the blind check. They are built of [`Chart`]s,
 //! bars and tables; nothing here computes what is not only for the eye.
 
 mod bars;
@@ -15,6 +16,7 @@ mod identification;
 mod page;
 mod role;
 pub mod text;
+mod withheld;
 
 pub use chart::{Axis, Chart, Layer};
 pub use error::ReportError;
@@ -22,3 +24,4 @@ pub use gap::{GapInput, gap_page};
 pub use identification::{IdentificationInput, identification_page};
 pub use page::Header;
 pub use role::Role;
+pub use withheld::{WithheldInput, withheld_page};

@@ -35,7 +35,23 @@ pub(crate) enum Tone {
 
 const STYLE: &str = include_str!("style.css");
 
-/// The whole document.
+/// What stands at the head of a document, under whatever names it has there.
+pub(crate) struct Sheet<'a> {
+    /// What kind of page it is.
+    pub(crate) title: &'a str,
+    /// Whose page it is.
+    pub(crate) subject: &'a str,
+    /// How the first line is meant.
+    pub(crate) tone: Tone,
+    /// The first line.
+    pub(crate) verdict: &'a str,
+    /// Names and values below it.
+    pub(crate) facts: &'a [(&'a str, &'a str)],
+    /// The command that made it.
+    pub(crate) command: &'a str,
+}
+
+/// The whole document of a car's data.
 pub(crate) fn page(title: &str, tone: Tone, verdict: &str, header: &Header, body: &Markup) -> String {
     let facts = [
         ("Car", header.car.as_str()),
@@ -45,25 +61,31 @@ pub(crate) fn page(title: &str, tone: Tone, verdict: &str, header: &Header, body
         ("Vehicle hash", &header.vehicle_hash),
         ("Seed", &header.seed.map_or_else(|| "none needed".to_owned(), |s| s.to_string())),
     ];
+    let (subject, command) = (&header.car, &header.command);
+    document(&Sheet { title, subject, tone, verdict, facts: &facts, command }, body)
+}
+
+/// The whole document.
+pub(crate) fn document(sheet: &Sheet<'_>, body: &Markup) -> String {
     html! {
         (DOCTYPE)
         html lang="en" {
             head {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (title) " · " (header.car) }
+                title { (sheet.title) " · " (sheet.subject) }
                 style { (PreEscaped(STYLE)) }
             }
             body {
                 header {
-                    p.kind { (title) }
-                    h1 class=(if tone == Tone::Good { "good" } else { "caution" }) { (verdict) }
+                    p.kind { (sheet.title) }
+                    h1 class=(if sheet.tone == Tone::Good { "good" } else { "caution" }) { (sheet.verdict) }
                     dl.facts {
-                        @for (name, value) in facts { div { dt { (name) } dd { (value) } } }
+                        @for (name, value) in sheet.facts { div { dt { (name) } dd { (value) } } }
                     }
                 }
                 main { (body) }
-                footer { p { "Made by" } code { (header.command) } }
+                footer { p { "Made by" } code { (sheet.command) } }
             }
         }
     }

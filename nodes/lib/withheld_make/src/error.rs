@@ -32,7 +32,9 @@ pub enum WithheldError {
         why: String,
     },
     /// The labels are not those that the commitment was made for.
-    #[error("{labels} is not the file that {commitment} was made for: SHA-256 {found}, committed to {committed}")]
+    #[error(
+        "{labels} is not the file that {commitment} was made for: SHA-256 {found}, committed to {committed}"
+    )]
     Tampered {
         /// The label file.
         labels: PathBuf,

@@ -53,8 +53,7 @@ impl Journal {
             // A line that was cut off is a case that is made again.
             let labels = lines.filter_map(|line| serde_json::from_str::<CaseLabel>(line).ok());
             let done = labels.map(|label| (label.case.clone(), label)).collect();
-            let mut file =
-                OpenOptions::new().append(true).open(&path).map_err(WithheldError::io(&path))?;
+            let mut file = OpenOptions::new().append(true).open(&path).map_err(WithheldError::io(&path))?;
             file.write_all(b"\n").map_err(WithheldError::io(&path))?;
             return Ok((Self { path, file, nonce: head.nonce, done }, asked));
         }

@@ -60,7 +60,8 @@ pub(crate) fn read(folder: &Path, with_tires: bool) -> Result<Vec<MeasuredDrive>
     folders.sort();
     let drives: Vec<MeasuredDrive> = folders.iter().map(|f| one(f, with_tires)).collect::<Result<_, _>>()?;
     if drives.is_empty() {
-        let why = "no drive there: expected a folder for each, with its .mcap file and vehicle.yaml".to_owned();
+        let why =
+            "no drive there: expected a folder for each, with its .mcap file and vehicle.yaml".to_owned();
         return Err(WithheldError::Source { path: folder.to_owned(), why });
     }
     Ok(drives)
@@ -142,7 +143,10 @@ impl MeasuredDrive {
         let margin_ns = ns(MARGIN_S);
         let spare_ns = last - first - 2 * ns(duration_s) - 3 * margin_ns;
         if spare_ns < 0 {
-            let why = format!("{:.0} s are too short for two stretches of {duration_s} s", (last - first) as f64 * 1e-9);
+            let why = format!(
+                "{:.0} s are too short for two stretches of {duration_s} s",
+                (last - first) as f64 * 1e-9
+            );
             return Err(WithheldError::Source { path: self.path.clone(), why });
         }
         let early = first + margin_ns + random.random_range(0..=spare_ns / 2);
@@ -158,7 +162,8 @@ impl MeasuredDrive {
 
 /// The effect as the code of `gripsight bag inject` knows it.
 pub(crate) fn effect(setting: &EffectSetting) -> Result<Effect, WithheldError> {
-    let values: Vec<String> = setting.parameters.iter().map(|(name, value)| format!("{name}:{value:?}")).collect();
+    let values: Vec<String> =
+        setting.parameters.iter().map(|(name, value)| format!("{name}:{value:?}")).collect();
     Ok(format!("{}={}", setting.name, values.join(",")).parse()?)
 }
 

@@ -243,8 +243,7 @@ fn fit(
     white: &[f64; CHANNELS],
     coloured: &[f64; CHANNELS],
 ) -> OracleFit {
-    let nothing =
-        OracleFit { severity: 0.0, size_ratio: 1.0, chi2_per_residual: 0.0, excess_without: None };
+    let nothing = OracleFit { severity: 0.0, size_ratio: 1.0, chi2_per_residual: 0.0, excess_without: None };
     let mut information = DMatrix::zeros(effects + TIRES, effects + TIRES);
     for i in effects..effects + TIRES {
         information[(i, i)] = TIRE_TRUST.powi(-2);
@@ -301,7 +300,8 @@ fn excess(windows: &[Window], effects: usize) -> Option<f64> {
         }
         // Both columns may be nought: an effect that this drive does not excite at all.
         information[(0, 0)] += 1e-12;
-        information.try_inverse().map_or(whole, |inverse| whole - moment.dot(&(&inverse * &moment))) / residuals
+        information.try_inverse().map_or(whole, |inverse| whole - moment.dot(&(&inverse * &moment)))
+            / residuals
     });
     left.filter(|l| l.is_finite()).reduce(f64::min)
 }

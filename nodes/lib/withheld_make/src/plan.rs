@@ -36,7 +36,12 @@ pub(crate) fn reference(cases: usize, random: &mut ChaCha8Rng) -> Vec<Planned> {
 }
 
 /// The same for drives into which effects are put afterwards; what the library lacks cannot be put in.
-pub(crate) fn measured(family: Family, cases: usize, sources: usize, random: &mut ChaCha8Rng) -> Vec<Planned> {
+pub(crate) fn measured(
+    family: Family,
+    cases: usize,
+    sources: usize,
+    random: &mut ChaCha8Rng,
+) -> Vec<Planned> {
     let counts = [
         (Kind::None, cases.div_ceil(4)),
         (Kind::Deleted, cases.div_ceil(6)),
@@ -88,7 +93,9 @@ mod tests {
         assert_eq!(Kind::ALL.map(count), [150, 150, 100, 100, 100]);
         let singles = |name| plan.iter().filter(|p| p.kind == Kind::Single && p.effects == [name]).count();
         assert!(draw::names(true).into_iter().all(|name| (4..=5).contains(&singles(name))));
-        assert!(plan.iter().all(|p| p.effects.len() == usize::from(p.kind != Kind::None) + usize::from(p.kind == Kind::Pair)));
+        assert!(plan.iter().all(
+            |p| p.effects.len() == usize::from(p.kind != Kind::None) + usize::from(p.kind == Kind::Pair)
+        ));
     }
 
     #[test]

@@ -17,13 +17,12 @@ pub(crate) fn true_axles(car: &CarParameters, mu: f64) -> [Axle; 2] {
     let weight_n = car.mass_kg * GRAVITY_MPS2 / (2.0 * car.wheelbase_m());
     let axle = |tire: TireParameters, load_n: f64| {
         let tire = Tire::new(tire, load_n, car.load_sensitivity, 0.0);
-        let peak_slip_rad = 2.5 * mu * tire.peak_friction(load_n, 1.0) * load_n
-            / tire.cornering_stiffness_n_per_rad(load_n);
+        let peak_slip_rad =
+            2.5 * mu * tire.peak_friction(load_n, 1.0) * load_n / tire.cornering_stiffness_n_per_rad(load_n);
         let curve: Vec<(f64, f64)> = (1..=60)
             .map(|i| {
                 let alpha_rad = 1.5 * peak_slip_rad * f64::from(i) / 60.0;
-                let contact =
-                    Contact { kappa: 0.0, tan_alpha: alpha_rad.tan(), load_n, road_friction: mu };
+                let contact = Contact { kappa: 0.0, tan_alpha: alpha_rad.tan(), load_n, road_friction: mu };
                 (alpha_rad, tire.force(contact).f_y_n / load_n)
             })
             .collect();
@@ -47,7 +46,11 @@ pub(crate) fn off_by_a_little(axles: [Axle; 2], random: &mut ChaCha8Rng) -> [Axl
 /// The file as the other stacks read it.
 pub(crate) fn file([front, rear]: [Axle; 2]) -> String {
     let rows = |axle: Axle, end: char| -> String {
-        ["B", "C", "D", "E"].iter().zip(axle).map(|(name, value)| format!("{name}{end}: {value:?}\n")).collect()
+        ["B", "C", "D", "E"]
+            .iter()
+            .zip(axle)
+            .map(|(name, value)| format!("{name}{end}: {value:?}\n"))
+            .collect()
     };
     format!("friction_coeff: 1.0\n{}{}floor: nominal\n", rows(front, 'f'), rows(rear, 'r'))
 }
@@ -106,7 +109,10 @@ mod tests {
             let car = CarParameters::by_name(name).unwrap();
             let [front, _] = true_axles(&car, 0.9);
             let stiffness = front[0] * front[1] * front[2];
-            assert!((stiffness / car.tire_front.cornering_stiffness_per_rad - 1.0).abs() < 0.02, "{name}: {front:?}");
+            assert!(
+                (stiffness / car.tire_front.cornering_stiffness_per_rad - 1.0).abs() < 0.02,
+                "{name}: {front:?}"
+            );
             assert!((front[2] / (0.9 * car.tire_front.grip) - 1.0).abs() < 0.02, "{name}: {front:?}");
         }
     }

@@ -35,7 +35,8 @@ const DEALS: usize = 1000;
 pub fn control(cases: &[Outside]) -> Control {
     let neighbours = nearest(cases);
     let mut kinds: Vec<Kind> = cases.iter().map(|c| c.kind).collect();
-    let hits = |kinds: &[Kind]| neighbours.iter().enumerate().filter(|(i, n)| kinds[*i] == kinds[**n]).count();
+    let hits =
+        |kinds: &[Kind]| neighbours.iter().enumerate().filter(|(i, n)| kinds[*i] == kinds[**n]).count();
     let found = hits(&kinds);
     let mut random = ChaCha8Rng::seed_from_u64(0);
     let mut dealt: Vec<usize> = (0..DEALS)

@@ -50,7 +50,12 @@ impl Answer {
     /// Smallest severity of its effects; none where the generator does not say.
     #[must_use]
     pub fn severity(&self) -> Option<f64> {
-        self.label.effects.iter().map(|e| e.oracle.map(|o| o.severity)).reduce(|a, b| Some(a?.min(b?))).flatten()
+        self.label
+            .effects
+            .iter()
+            .map(|e| e.oracle.map(|o| o.severity))
+            .reduce(|a, b| Some(a?.min(b?)))
+            .flatten()
     }
 
     /// Whether the targets speak of this case: race pace, and every effect large enough where its limit is known.
@@ -68,9 +73,7 @@ impl Answer {
 
     fn named(&self) -> impl Iterator<Item = &SaidEffect> {
         let true_name = |name: &String| self.label.effects.iter().any(|t| t.name == *name);
-        self.said
-            .accepted()
-            .filter(move |e| true_name(&e.name) || !self.label.contained.contains(&e.name))
+        self.said.accepted().filter(move |e| true_name(&e.name) || !self.label.contained.contains(&e.name))
     }
 
     /// The first name, or the verdict; `effects` where only what the drive has of its own is named.
@@ -130,7 +133,9 @@ impl Answer {
     #[must_use]
     pub fn right(&self) -> bool {
         match self.label.kind {
-            Kind::None => NOTHING.contains(&self.said.verdict.as_str()) || !self.false_alarm() && !self.abstained(),
+            Kind::None => {
+                NOTHING.contains(&self.said.verdict.as_str()) || !self.false_alarm() && !self.abstained()
+            }
             Kind::Single => self.exact(),
             Kind::Pair => self.found() == 2,
             Kind::OutOfLibrary | Kind::Deleted => self.abstained(),
@@ -156,6 +161,22 @@ impl Answer {
     pub fn shrinkage_over_oracle(&self) -> Option<f64> {
         let oracle = self.oracle.as_ref()?.shrinkage()?;
         (oracle > 0.05).then_some(self.said.shrinkage()? / oracle)
+    }
+}
+
+/// What is named in a recorded drive without anything put in, is the drive's own: adds it to what every case of the same drive contains.
+pub fn excuse_what_drives_have(answers: &mut [Answer]) {
+    let drive = |a: &Answer| a.label.circumstances.get("car").cloned();
+    let mut own: Vec<(Option<serde_json::Value>, String)> = Vec::new();
+    for a in answers.iter().filter(|a| a.label.family == Family::Recorded && a.label.kind == Kind::None) {
+        own.extend(a.said.names().map(|name| (drive(a), name.to_owned())));
+    }
+    for answer in answers.iter_mut().filter(|a| a.label.family == Family::Recorded) {
+        let here = drive(answer);
+        let names = own.iter().filter(|(d, _)| *d == here).map(|(_, name)| name);
+        answer.label.contained.extend(names.cloned());
+        answer.label.contained.sort();
+        answer.label.contained.dedup();
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! Every rate carries its 95 % Wilson interval ([`Rate`]). Targets and thresholds, with the day they were fixed, are in `targets.json`.
 
+mod baselines;
 mod calibration;
 mod control;
 mod judge;
@@ -11,9 +12,10 @@ mod targets;
 mod text;
 mod verdict;
 
+pub use baselines::baselines;
 pub use calibration::{Calibration, CalibrationBin};
 pub use control::{Control, Outside, control};
-pub use judge::{Answer, SizeCheck};
+pub use judge::{Answer, SizeCheck, excuse_what_drives_have};
 pub use rate::{Rate, median};
 pub use scores::{EffectScore, FamilyScore, Line, Miss, SEVERITY_BANDS, Scores};
 pub use targets::Targets;

@@ -14,7 +14,8 @@ impl Scores {
             for line in &family.lines {
                 let _ = writeln!(text, "  {:<46} {:<30} {}", line.what, reached(line), line.verdict());
             }
-            let kinds: Vec<String> = family.by_kind.iter().map(|(kind, rate)| format!("{kind} {}", short(rate))).collect();
+            let kinds: Vec<String> =
+                family.by_kind.iter().map(|(kind, rate)| format!("{kind} {}", short(rate))).collect();
             let _ = writeln!(text, "  right over all cases: {}", kinds.join(", "));
             for (method, rate) in &family.baselines {
                 let _ = writeln!(text, "  {method:<46} {}", long(rate));
