@@ -108,7 +108,7 @@ impl Batch {
     pub fn labels(&self, nonce: String, cases: Vec<CaseLabel>) -> Result<Labels, WithheldError> {
         let settings = serde_json::to_value(&self.settings)
             .and_then(serde_json::from_value::<BTreeMap<String, Value>>)
-            .map_err(|e| WithheldError::content(Path::new("settings"), e))?;
+            .map_err(|e| WithheldError::content(Path::new("settings"), &e))?;
         Ok(Labels { nonce, seed: self.settings.seed, settings, cases })
     }
 

@@ -76,7 +76,7 @@ impl WithheldError {
         move |source| Self::Io { path: path.to_owned(), source }
     }
 
-    pub(crate) fn content(path: &Path, why: impl ToString) -> Self {
+    pub(crate) fn content(path: &Path, why: &impl ToString) -> Self {
         Self::Content { path: path.to_owned(), why: why.to_string() }
     }
 }

@@ -44,7 +44,7 @@ impl Journal {
             let text = fs::read_to_string(&path).map_err(WithheldError::io(&path))?;
             let mut lines = text.lines();
             let head: Head = serde_json::from_str(lines.next().unwrap_or_default())
-                .map_err(|e| WithheldError::content(&path, e))?;
+                .map_err(|e| WithheldError::content(&path, &e))?;
             let asked = settings(seed.unwrap_or(head.settings.seed));
             if asked != head.settings {
                 let found = serde_json::to_string(&head.settings).unwrap_or_default();
@@ -63,7 +63,7 @@ impl Journal {
         });
         let head = Head { nonce: hex(&random_bytes::<32>(&path)?), settings: settings.clone() };
         let mut file = File::create(&path).map_err(WithheldError::io(&path))?;
-        let line = serde_json::to_string(&head).map_err(|e| WithheldError::content(&path, e))?;
+        let line = serde_json::to_string(&head).map_err(|e| WithheldError::content(&path, &e))?;
         writeln!(file, "{line}").map_err(WithheldError::io(&path))?;
         Ok((Self { path, file, nonce: head.nonce, done: BTreeMap::new() }, settings))
     }
@@ -79,7 +79,7 @@ impl Journal {
     /// # Errors
     /// [`WithheldError::Io`].
     pub fn note(&mut self, label: CaseLabel) -> Result<(), WithheldError> {
-        let line = serde_json::to_string(&label).map_err(|e| WithheldError::content(&self.path, e))?;
+        let line = serde_json::to_string(&label).map_err(|e| WithheldError::content(&self.path, &e))?;
         writeln!(self.file, "{line}").map_err(WithheldError::io(&self.path))?;
         self.done.insert(label.case.clone(), label);
         Ok(())
@@ -102,6 +102,6 @@ impl Journal {
 
 fn random_bytes<const N: usize>(path: &Path) -> Result<[u8; N], WithheldError> {
     let mut bytes = [0; N];
-    SysRng.try_fill_bytes(&mut bytes).map_err(|e| WithheldError::content(path, e))?;
+    SysRng.try_fill_bytes(&mut bytes).map_err(|e| WithheldError::content(path, &e))?;
     Ok(bytes)
 }

@@ -79,7 +79,7 @@ fn one(folder: &Path, with_tires: bool) -> Result<MeasuredDrive, WithheldError> 
     let number = |key: &str| {
         let line = vehicle.lines().find_map(|l| l.trim().strip_prefix(key)?.strip_prefix(':'));
         let value = line.and_then(|v| v.trim().parse::<f64>().ok());
-        value.ok_or_else(|| WithheldError::content(&path, format!("{key} is missing")))
+        value.ok_or_else(|| WithheldError::content(&path, &format!("{key} is missing")))
     };
     let car = Car { l_f_m: number("l_f_m")?, l_r_m: number("l_r_m")?, mass_kg: number("mass_kg")? };
     let truth = folder.join(TRUTH);
@@ -88,9 +88,9 @@ fn one(folder: &Path, with_tires: bool) -> Result<MeasuredDrive, WithheldError> 
     let contained = if about.exists() {
         let text = fs::read_to_string(&about).map_err(WithheldError::io(&about))?;
         let value: BTreeMap<String, Value> =
-            serde_json::from_str(&text).map_err(|e| WithheldError::content(&about, e))?;
+            serde_json::from_str(&text).map_err(|e| WithheldError::content(&about, &e))?;
         let names = value.get("contained").cloned().unwrap_or_else(|| Value::Array(Vec::new()));
-        serde_json::from_value(names).map_err(|e| WithheldError::content(&about, e))?
+        serde_json::from_value(names).map_err(|e| WithheldError::content(&about, &e))?
     } else {
         Vec::new()
     };
@@ -108,7 +108,7 @@ fn one(folder: &Path, with_tires: bool) -> Result<MeasuredDrive, WithheldError> 
 
 /// The Magic Formula of the axle forces that the plant's author wrote down, over static loads.
 fn true_axles(path: &Path, car: &Car) -> Result<[Axle; 2], WithheldError> {
-    let content = |why: String| WithheldError::content(path, why);
+    let content = |why: String| WithheldError::content(path, &why);
     let mut reader = csv::Reader::from_path(path).map_err(|e| content(e.to_string()))?;
     let weight_n = car.mass_kg * GRAVITY_MPS2 / (car.l_f_m + car.l_r_m);
     let (mut front, mut rear) = (Vec::new(), Vec::new());

@@ -1,5 +1,8 @@
 //! A batch: repeatable, sealed, taken up again, and silent about its labels.
 
+// Helpers outside of #[test] functions panic like tests do.
+#![allow(clippy::unwrap_used)]
+
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;

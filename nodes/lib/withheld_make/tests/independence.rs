@@ -1,5 +1,8 @@
 //! What makes the cases shares no model code with what diagnoses them.
 
+// Helpers outside of #[test] functions panic like tests do.
+#![allow(clippy::unwrap_used)]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
