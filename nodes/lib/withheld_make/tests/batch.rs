@@ -29,8 +29,27 @@ fn make(folder: &Path) -> (Batch, Vec<CaseLabel>) {
     (batch, labels)
 }
 
+fn what_drives_show(labels: &[CaseLabel]) {
+    for label in labels {
+        for effect in &label.effects {
+            let fit = effect.oracle.unwrap();
+            assert!(
+                fit.severity.is_finite() && fit.severity >= 0.0 && fit.size_ratio.is_finite(),
+                "{label:?}"
+            );
+            let unknown = matches!(label.kind, Kind::Deleted | Kind::OutOfLibrary);
+            assert_eq!(fit.excess_without.is_some(), unknown);
+            // A stand-in explains some of it, never more than there is.
+            assert!(
+                fit.excess_without.is_none_or(|left| left >= 0.0 && left <= 1.001 * fit.chi2_per_residual)
+            );
+            assert_eq!(label.without.contains(&effect.name), label.kind == Kind::Deleted);
+        }
+    }
+}
+
 #[test]
-fn a_batch_is_repeatable_sealed_and_silent() {
+fn a_batch_is_repeatable_sealed_and_silent_and_says_what_drives_show() {
     let folder = tempfile::tempdir().unwrap();
     let (batch, labels) = make(folder.path());
     assert!(Kind::ALL.iter().all(|kind| labels.iter().any(|l| l.kind == *kind)));
@@ -52,6 +71,8 @@ fn a_batch_is_repeatable_sealed_and_silent() {
     };
     assert!(labels.iter().all(|label| outside(label) == outside(&labels[0])));
 
+    what_drives_show(&labels);
+
     let sealed = folder.path().join("labels.json");
     let opened = batch.labels("nonce".to_owned(), labels.clone()).unwrap();
     opened.seal(&sealed, folder.path()).unwrap();
@@ -60,28 +81,6 @@ fn a_batch_is_repeatable_sealed_and_silent() {
     fs::write(&sealed, text.replacen("\"none\"", "\"pair\"", 1)).unwrap();
     let refused = Labels::open(&sealed, folder.path());
     assert!(matches!(refused, Err(WithheldError::Tampered { .. })), "{refused:?}");
-}
-
-#[test]
-fn effects_are_sealed_with_what_the_drive_shows_of_them() {
-    let folder = tempfile::tempdir().unwrap();
-    let (_, labels) = make(folder.path());
-    for label in labels {
-        for effect in &label.effects {
-            let fit = effect.oracle.unwrap();
-            assert!(
-                fit.severity.is_finite() && fit.severity >= 0.0 && fit.size_ratio.is_finite(),
-                "{label:?}"
-            );
-            let unknown = matches!(label.kind, Kind::Deleted | Kind::OutOfLibrary);
-            assert_eq!(fit.excess_without.is_some(), unknown);
-            // A stand-in explains some of it, never more than there is.
-            assert!(
-                fit.excess_without.is_none_or(|left| left >= 0.0 && left <= 1.001 * fit.chi2_per_residual)
-            );
-            assert_eq!(label.without.contains(&effect.name), label.kind == Kind::Deleted);
-        }
-    }
 }
 
 #[test]
