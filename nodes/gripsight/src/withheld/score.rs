@@ -37,6 +37,9 @@ pub(crate) struct ScoreArgs {
     /// Do without the oracle: no shrinkage beside it.
     #[arg(long)]
     no_oracle: bool,
+    /// Score the cases that are diagnosed so far. Their order tells nothing, so they stand for the batch.
+    #[arg(long)]
+    so_far: bool,
     /// Where the files go; made if it is not there.
     #[arg(long, value_name = "REPORT")]
     out: PathBuf,
@@ -66,8 +69,17 @@ pub(crate) fn run(args: &ScoreArgs) -> anyhow::Result<Outcome> {
     }
     fs::create_dir_all(&args.out).with_context(|| format!("cannot make {}", args.out.display()))?;
     let targets = Targets::fixed()?;
-    let mut answers =
-        labels.cases.iter().map(|label| answer(label, &args.verdicts)).collect::<anyhow::Result<Vec<_>>>()?;
+    let diagnosed =
+        |label: &&CaseLabel| !args.so_far || args.verdicts.join(&label.case).join("gap.json").exists();
+    let mut answers = labels
+        .cases
+        .iter()
+        .filter(diagnosed)
+        .map(|label| answer(label, &args.verdicts))
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    if answers.len() < labels.cases.len() {
+        tracing::warn!("{} of {} cases are diagnosed so far", answers.len(), labels.cases.len());
+    }
     excuse_what_drives_have(&mut answers);
     if !args.no_oracle {
         ask_oracle(&mut answers, &targets, args)?;
