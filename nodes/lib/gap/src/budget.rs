@@ -9,7 +9,6 @@ use crate::flexible::Flexible;
 use crate::outcome::GapBudget;
 use crate::recording::Recording;
 use crate::select::Round;
-use crate::verdict::last_look;
 use crate::windows::{HORIZON_S, Split, Windows, of_length, split};
 
 /// Errors of the models on the scored blocks.
@@ -24,7 +23,6 @@ pub(crate) struct Budget {
     pub(crate) scored_on: &'static str,
     /// What the best of the effects that were not taken would close.
     candidates: Vec<(EffectId, Estimate)>,
-    instead: bool,
 }
 
 /// The models that are scored.
@@ -36,10 +34,8 @@ pub(crate) struct Models<'m> {
     pub(crate) null: &'m State,
     /// With the effects taken.
     pub(crate) state: &'m State,
-    /// How they were found.
-    pub(crate) rounds: &'m [Round],
-    /// Whether the effect stands in place of a retune.
-    pub(crate) instead: bool,
+    /// The last look, in which nothing more was found.
+    pub(crate) last: &'m Round,
 }
 
 /// Iterations of the fits of the steps between.
@@ -58,7 +54,7 @@ impl Budget {
         windows: &Split,
         models: &Models<'_>,
     ) -> Self {
-        let Models { nominal, null, state, rounds, instead } = *models;
+        let Models { nominal, null, state, last } = *models;
         // The other bag has its own noise; models and weights are those fitted here.
         let foreign = other.map(|r| (Engine { recording: r, ..engine.clone() }, split(r, false)));
         let (scorer, on, scored_on): (&Engine<'_>, Windows, _) = match &foreign {
@@ -73,36 +69,31 @@ impl Budget {
         let blocks = |effects: &[EffectId], flexible: Option<&Flexible>, p: &[f64]| {
             by_block(scorer.recording, &on, &scorer.score(effects, flexible, p, &on))
         };
-        let retuned = blocks(&[], None, &null.parameters);
+        let retuned = blocks(&null.effects, None, &null.parameters);
         let mut steps = vec![retuned.clone()];
-        let mut so_far = Vec::new();
-        for best in rounds.iter().filter_map(|r| r.taken.and_then(|i| r.refits.get(i))) {
-            so_far.push(best.effect);
-            if so_far.len() < state.effects.len() {
-                let values = &best.state.parameters;
-                let step = engine.fit(&so_far, values, None, &windows.training, STEP_ITERATIONS);
-                steps.push(blocks(&so_far, None, &step.parameters));
-            }
+        for count in 1..state.named.len() {
+            let named = &state.named[..count];
+            let values = engine.carry(state, named);
+            let step = engine.fit(named, &values, None, &windows.training, STEP_ITERATIONS);
+            steps.push(blocks(&step.effects, None, &step.parameters));
         }
-        if !state.effects.is_empty() {
+        if !state.named.is_empty() {
             steps.push(blocks(&state.effects, None, &state.parameters));
         }
-        let candidates = last_look(rounds).map_or_else(Vec::new, |round| {
-            let left = round.refits.iter().filter(|r| !state.effects.contains(&r.effect));
-            left.take(CANDIDATES)
-                .filter_map(|r| {
-                    let (effects, values) = (&r.state.effects, &r.state.parameters);
-                    let from = steps.get(effects.len().checked_sub(1)?)?;
-                    let fitted = engine.fit(effects, values, None, &windows.training, CANDIDATE_ITERATIONS);
-                    Some((r.effect, closed(from, &blocks(effects, None, &fitted.parameters), &retuned)))
-                })
-                .collect()
-        });
+        let left = last.refits.iter().filter(|r| !state.named.contains(&r.effect));
+        let candidates = left
+            .take(CANDIDATES)
+            .filter_map(|r| {
+                let (named, values) = (&r.state.named, &r.state.parameters);
+                let from = steps.last()?;
+                let fitted = engine.fit(named, values, None, &windows.training, CANDIDATE_ITERATIONS);
+                Some((r.effect, closed(from, &blocks(&fitted.effects, None, &fitted.parameters), &retuned)))
+            })
+            .collect();
         let slip = large_slip_rad(engine, null, &windows.training);
         let flexible = Flexible::new(engine.recording, slip, engine.vehicle.wheelbase_m());
         let ceiling = engine.fit_flexible(state, &flexible, &windows.training);
         let whole = match steps.last() {
-            Some(_) if instead => Estimate::UNKNOWN,
             Some(last) if steps.len() > 1 => closed(&retuned, last, &retuned),
             _ => Estimate::default(),
         };
@@ -115,7 +106,6 @@ impl Budget {
             closed: whole,
             scored_on,
             candidates,
-            instead,
         }
     }
 
@@ -130,14 +120,14 @@ impl Budget {
     /// What the effect taken as number `step`, from 1, closes after those before it.
     pub(crate) fn closed_by_step(&self, step: usize) -> Estimate {
         match (self.steps.get(step - 1), self.steps.get(step), self.steps.first()) {
-            (Some(from), Some(to), Some(retuned)) if !self.instead => closed(from, to, retuned),
+            (Some(from), Some(to), Some(retuned)) => closed(from, to, retuned),
             _ => Estimate::UNKNOWN,
         }
     }
 
     /// What an effect that was not taken would close on top of those that were.
     pub(crate) fn closed_by_candidate(&self, effect: EffectId) -> Estimate {
-        self.candidates.iter().find(|c| c.0 == effect && !self.instead).map_or(Estimate::UNKNOWN, |c| c.1)
+        self.candidates.iter().find(|c| c.0 == effect).map_or(Estimate::UNKNOWN, |c| c.1)
     }
 
     /// As the result states it.

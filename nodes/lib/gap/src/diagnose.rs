@@ -8,9 +8,10 @@ use crate::effects::{EffectId, Need};
 use crate::engine::{Engine, State, TireTrust};
 use crate::outcome::{DetectionLimit, Diagnosis, Invisible, TirePair};
 use crate::recording::Recording;
-use crate::select::{Round, reweigh, round, thresholds};
+use crate::search::{Found, search};
+use crate::select::reweigh;
 use crate::usable::{Usable, cannot_tell, refused, usable};
-use crate::verdict::{decide, rank};
+use crate::verdict::{decide, looks, rank};
 use crate::windows::{Windows, split};
 use crate::{GapError, pictures, place};
 
@@ -33,8 +34,12 @@ pub struct Request<'a> {
     pub only: &'a [String],
 }
 
-/// Where a fit without any knowledge of the tires starts.
-const GENERIC: [f64; 8] = [6.5, 1.5, 1.0, 0.0, 6.5, 1.5, 1.0, 0.0];
+/// Where fits without any knowledge of the tires start: (B, C, D, E) front and rear.
+const GENERIC: [[f64; 8]; 3] = [
+    [6.5, 1.5, 1.0, 0.0, 6.5, 1.5, 1.0, 0.0],
+    [12.0, 1.5, 1.2, 0.0, 13.0, 1.5, 1.2, 0.0],
+    [14.0, 1.5, 1.7, 0.0, 18.0, 1.5, 1.7, 0.0],
+];
 /// Windows that the search works on, at most.
 const SEARCH_WINDOWS: usize = 70;
 
@@ -74,83 +79,47 @@ fn explain(
     let mut engine = Engine::new(&recording, request.vehicle, tires, trust);
     let nominal = engine.nominal_parameters();
     // The search works on a bounded number of windows, the final fit on all.
-    let search = windows.training.thinned(SEARCH_WINDOWS);
-    let first = engine.fit(&[], &nominal, None, &search, 25);
+    let search_windows = windows.training.thinned(SEARCH_WINDOWS);
+    let blank = engine.blank();
+    let first = engine.fit(&[], &blank, None, &search_windows, 25);
     if !first.finite {
         return Err(GapError::NotFinite);
     }
-    reweigh(&mut engine, &first, &search);
-    let null = engine.fit(&[], &first.parameters, Some(first.starts), &search, 15);
-
-    let mut state = null.clone();
-    let mut rounds: Vec<Round> = Vec::new();
-    // Whether the effect stands instead of a retune: the tires are then held where they were handed over.
-    let mut instead = false;
-    while rounds.len() <= thresholds::MOST_EFFECTS {
-        progress(&format!(
-            "comparing {} effects, round {}",
-            library.len() - state.effects.len(),
-            rounds.len() + 1
-        ));
-        let here = round(&engine, &state, &library, &search, rounds.len());
-        let taken = here.taken;
-        let next = taken.and_then(|i| here.refits.get(i)).map(|r| r.state.clone());
-        rounds.push(here);
-        match next {
-            Some(next) if rounds.len() <= thresholds::MOST_EFFECTS => {
-                state = next;
-                reweigh(&mut engine, &state, &search);
-                let effects = state.effects.clone();
-                state = engine.fit(&effects, &state.parameters, Some(state.starts), &search, 8);
-            }
-            _ => break,
-        }
-    }
-
-    if state.effects.is_empty() && engine.trust != TireTrust::free() {
-        progress("comparing effects with a retune of the tires");
-        if let Some((here, found)) = instead_of_retune(&engine, &null, &library, &search) {
-            rounds = vec![here];
-            state = found;
-            instead = true;
-        }
-    }
-    let (null, state) = if search.windows.len() < windows.training.windows.len() {
+    reweigh(&mut engine, &first, &search_windows);
+    let null = engine.fit(&[], &first.parameters, Some(first.starts), &search_windows, 15);
+    let Found { state, evidence, last, costs } =
+        search(&mut engine, &null, &library, &search_windows, progress);
+    let (null, state) = if search_windows.windows.len() < windows.training.windows.len() {
         progress("fitting on all training blocks");
-        let held = engine.holding();
-        let on_all =
-            |e: &Engine<'_>, s: &State| e.fit(&s.effects, &s.parameters, None, &windows.training, 10);
-        (on_all(&engine, &null), on_all(if instead { &held } else { &engine }, &state))
+        let on_all = |s: &State| engine.fit(&s.named, &s.parameters, None, &windows.training, 10);
+        (on_all(&null), on_all(&state))
     } else {
         (null, state)
     };
     progress("scoring on held-out data");
-    let models = Models { nominal: &nominal, null: &null, state: &state, rounds: &rounds, instead };
+    let models = Models { nominal: &nominal, null: &null, state: &state, last: &last };
     let budget = Budget::of(&engine, other.as_ref(), &windows, &models);
-    let (verdict, mut reasons) = decide(&budget, &rounds, &state, instead);
+    let (verdict, mut reasons) = decide(&budget, &last, &state, &costs);
     reasons.extend(crate::noise::caveat(&recording));
-    let effects = rank(&rounds, &state, &budget);
+    let blocks = &windows.training.block;
+    let effects = rank(&evidence, &last, &state, &budget, blocks);
     let scored_windows =
         if windows.held_out.windows.is_empty() { &windows.training } else { &windows.held_out };
     let on_all = split(&recording, false).training;
     let nominal_score = engine.score(&[], None, &nominal, &on_all);
-    let detection_limits = rounds
-        .first()
-        .map(|r| {
-            r.screening
-                .candidates
-                .iter()
-                .flat_map(|c| {
-                    c.effect.spec().parameters.iter().zip(&c.error).map(|(p, e)| DetectionLimit {
-                        name: c.effect.name(),
-                        parameter: p.name,
-                        size: 5.0 * e,
-                    })
-                })
-                .filter(|l| l.size.is_finite())
-                .collect()
+    let detection_limits = last
+        .screening
+        .candidates
+        .iter()
+        .flat_map(|c| {
+            c.effect.spec().parameters.iter().zip(&c.error).map(|(p, e)| DetectionLimit {
+                name: c.effect.name(),
+                parameter: p.name,
+                size: 5.0 * e,
+            })
         })
-        .unwrap_or_default();
+        .filter(|l| l.size.is_finite())
+        .collect();
     Ok(Diagnosis {
         verdict,
         reasons,
@@ -164,41 +133,33 @@ fn explain(
         gap_closed_fraction: budget.closed,
         tires: TirePair { without_effect: null.tires(), with_effect: state.tires() },
         data_health,
+        looks: looks(&engine, &evidence, &last, &state),
+        search_costs: costs,
         series: pictures::series(&engine, &nominal, &null, &state, &on_all, &nominal_score, scored_windows),
     })
 }
 
-/// Where trusted tires had to move far, an effect may explain the same with the tires as they were: the round of that search, and
-/// the model found, if one does as well as the retune.
-fn instead_of_retune(
-    engine: &Engine<'_>,
-    null: &State,
-    library: &[EffectId],
-    windows: &Windows,
-) -> Option<(Round, State)> {
-    if engine.tire_shift(null) < thresholds::FAR_SHIFT {
-        return None;
-    }
-    let held = engine.holding();
-    let before = held.fit(&[], &held.nominal_parameters(), None, windows, 12);
-    let here = round(&held, &before, library, windows, 0);
-    let best = here.taken.and_then(|i| here.refits.get(i)).map(|r| r.state.clone())?;
-    // Let go again, the tires must stay nearer to what was handed over than a retune would take them.
-    let free = engine.fit(&best.effects, &best.parameters, Some(best.starts.clone()), windows, 12);
-    let cost = |s: &State| s.window_costs.iter().sum::<f64>();
-    let as_good = cost(&free) < cost(null) + thresholds::LEAST_GAIN * null.residuals();
-    let nearer = engine.tire_shift(&free) < thresholds::NEARER * engine.tire_shift(null);
-    (free.finite && as_good && nearer).then_some((here, best))
-}
-
-/// The best tires of a recording, with nothing known of them.
+/// The best tires of a recording, with nothing known of them: from several starts, soft and stiff.
 fn fit_tires(
     recording: &Recording,
     vehicle: &VehicleParameters,
     windows: &Windows,
 ) -> Result<PacejkaParameters, GapError> {
-    let engine = Engine::new(recording, vehicle, PacejkaParameters::from_array(GENERIC), TireTrust::free());
-    let state = engine.fit(&[], &engine.nominal_parameters(), None, windows, 25);
+    const FIRST: usize = 8;
+    const REST: usize = 17;
+    let windows = windows.thinned(SEARCH_WINDOWS);
+    let best = GENERIC
+        .iter()
+        .map(|&start| {
+            let engine =
+                Engine::new(recording, vehicle, PacejkaParameters::from_array(start), TireTrust::free());
+            let state = engine.fit(&[], &engine.blank(), None, &windows, FIRST);
+            (engine, state)
+        })
+        .filter(|(_, state)| state.finite)
+        .min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+    let (engine, state) = best.ok_or(GapError::NotFinite)?;
+    let state = engine.fit(&[], &state.parameters, Some(state.starts), &windows, REST);
     if state.finite { Ok(state.tires()) } else { Err(GapError::NotFinite) }
 }
 

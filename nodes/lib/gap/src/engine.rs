@@ -9,7 +9,6 @@ use crate::effects::{EffectId, ParameterSpec};
 use crate::flexible::Flexible;
 use crate::model::{BASE, ExtendedModel, HOLD, TIRES, tires_from_parameters, tires_to_parameters};
 use crate::recording::Recording;
-use crate::select::thresholds;
 use crate::windows::Windows;
 
 /// How far the tires handed over are trusted, as one standard deviation.
@@ -38,17 +37,6 @@ impl TireTrust {
         Self { stiffness: 0.02, peak: 0.02, shape: 0.05, curvature: 0.25 }
     }
 
-    /// The same, so many times tighter.
-    #[must_use]
-    pub(crate) fn tighter(self, factor: f64) -> Self {
-        Self {
-            stiffness: self.stiffness / factor,
-            peak: self.peak / factor,
-            shape: self.shape / factor,
-            curvature: self.curvature / factor,
-        }
-    }
-
     /// No tires given: only what makes the fit well posed.
     #[must_use]
     pub fn free() -> Self {
@@ -60,12 +48,29 @@ impl TireTrust {
 const TIRE_BOUNDS: [[f64; 2]; 4] = [[1.5, 80.0], [1.0, 2.3], [0.1, 3.0], [-4.0, 0.98]];
 /// Effects are expected within this many of their sizes.
 const PRIOR_SIZES: f64 = 3.0;
+/// Trust in the tires is one observation beside thousands of residuals, but the errors of a model within a window are all alike: so many
+/// residuals count as one when they argue against that trust.
+const RESIDUALS_PER_OBSERVATION: f64 = 30.0;
+/// What any real car does a little of: fitted beside the tires, within what is usual.
+const BACKGROUND: [EffectId; 5] = [
+    EffectId::TireRelaxation,
+    EffectId::LateralLoadTransfer,
+    EffectId::LongitudinalLoadTransfer,
+    EffectId::CombinedSlip,
+    EffectId::YawInertiaError,
+];
+/// What is usual, as a share of the wheel's radius (relaxation), of the height of the centre of gravity (longitudinal transfer), and of a
+/// size that matters (the others; of the yaw inertia, which is seldom measured, a tenth).
+const USUAL: [f64; 5] = [0.33, 0.27, 0.33, 0.14, 0.67];
 /// Windows whose mean square is beyond this many sigma count less and less.
 pub(crate) const ROBUST_K: f64 = 3.0;
 
 /// A model with its parameters fitted.
 #[derive(Debug, Clone)]
 pub(crate) struct State {
+    /// Effects that are claimed.
+    pub(crate) named: Vec<EffectId>,
+    /// All of the model: the background that is not claimed, then those that are.
     pub(crate) effects: Vec<EffectId>,
     pub(crate) parameters: Vec<f64>,
     pub(crate) starts: Vec<[f64; 2]>,
@@ -156,17 +161,51 @@ impl<'a> Engine<'a> {
         p
     }
 
-    /// The same, with the tires held where they were handed over.
-    pub(crate) fn holding(&self) -> Self {
-        Self { trust: self.trust.tighter(thresholds::HELD_TIRES), ..self.clone() }
+    /// How much of an effect this car may well have without anything being the matter; `None` of those that are no background.
+    pub(crate) fn usual(&self, effect: EffectId) -> Option<f64> {
+        let place = BACKGROUND.iter().position(|e| *e == effect)?;
+        let size = self.size(&effect.spec().parameters[0]);
+        let scale = match effect {
+            EffectId::TireRelaxation => self.vehicle.wheel_radius_m.unwrap_or(0.6 * size),
+            EffectId::LongitudinalLoadTransfer => self.vehicle.h_cg_m,
+            _ => size,
+        };
+        Some(USUAL[place] * scale)
     }
 
-    /// How far a state's tires lie from those handed over: sum of squares in units of the trust.
+    /// The nominal model with a background of nothing.
+    pub(crate) fn blank(&self) -> Vec<f64> {
+        let mut p = self.nominal_parameters();
+        p.extend(BACKGROUND.iter().flat_map(|e| Self::null_values(*e)));
+        p
+    }
+
+    /// The effects of a model that claims `named`, in the order of its parameters.
+    pub(crate) fn layout(&self, named: &[EffectId]) -> Vec<EffectId> {
+        let silent = BACKGROUND.iter().filter(|e| !named.contains(e));
+        silent.chain(named).copied().collect()
+    }
+
+    /// The parameters of a state, for a model that claims `named`; what the state lacks is at its null.
+    pub(crate) fn carry(&self, state: &State, named: &[EffectId]) -> Vec<f64> {
+        let mut values = state.parameters[..BASE].to_vec();
+        for effect in self.layout(named) {
+            match state.of(effect) {
+                Some(own) => values.extend(own),
+                None => values.extend(Self::null_values(effect)),
+            }
+        }
+        values
+    }
+
+    /// How far a state's tires lie from those handed over: root of the mean square in units of the trust.
     pub(crate) fn tire_shift(&self, state: &State) -> f64 {
-        self.parameters(&[], &state.parameters[..BASE], 1.0)
+        let trusted = self.parameters(&[], &[], &state.parameters[..BASE], 1.0);
+        let squares = trusted
             .iter()
-            .filter_map(|p| p.prior.map(|prior| ((p.start - prior.mean) / prior.sigma).powi(2)))
-            .sum()
+            .filter_map(|p| p.prior.map(|prior| ((p.start - prior.mean) / prior.sigma).powi(2)));
+        let tighter = if self.trust == TireTrust::free() { 1.0 } else { RESIDUALS_PER_OBSERVATION };
+        (squares.sum::<f64>() / tighter / TIRES as f64).sqrt()
     }
 
     pub(crate) fn model(&self, effects: &[EffectId], flexible: Option<&Flexible>) -> ExtendedModel<'a> {
@@ -181,9 +220,16 @@ impl<'a> Engine<'a> {
     }
 
     /// Bounds and priors of all parameters of a model; `values` is where a fit starts.
-    pub(crate) fn parameters(&self, effects: &[EffectId], values: &[f64], ridge: f64) -> Vec<Parameter> {
+    pub(crate) fn parameters(
+        &self,
+        named: &[EffectId],
+        effects: &[EffectId],
+        values: &[f64],
+        ridge: f64,
+    ) -> Vec<Parameter> {
         let mean = tires_to_parameters(&self.nominal);
         let trust = &self.trust;
+        let tighter = if self.trust == TireTrust::free() { 1.0 } else { RESIDUALS_PER_OBSERVATION.sqrt() };
         let mut out: Vec<Parameter> = (0..TIRES)
             .map(|j| {
                 let [low, high] = TIRE_BOUNDS[j % 4];
@@ -198,7 +244,7 @@ impl<'a> Engine<'a> {
                     low,
                     high,
                     free: true,
-                    prior: Some(Prior { mean: mean[j], sigma }),
+                    prior: Some(Prior { mean: mean[j], sigma: sigma / tighter }),
                 }
             })
             .collect();
@@ -213,9 +259,20 @@ impl<'a> Engine<'a> {
             prior: None,
         });
         for effect in effects {
+            let usual = self.usual(*effect).filter(|_| !named.contains(effect));
             for spec in effect.spec().parameters {
                 let size = self.size(spec);
                 let place = out.len();
+                if let Some(usual) = usual {
+                    out.push(Parameter {
+                        start: values[place],
+                        low: spec.null + (spec.range[0] * size).max(-usual),
+                        high: spec.null + usual,
+                        free: true,
+                        prior: Some(Prior { mean: spec.null, sigma: usual }),
+                    });
+                    continue;
+                }
                 out.push(Parameter {
                     start: values[place],
                     low: spec.null + spec.range[0] * size,
@@ -242,20 +299,22 @@ impl<'a> Engine<'a> {
         Problem { model, windows, sigma: &self.sigma, parameters, robust_k: ROBUST_K, max_iterations }
     }
 
-    /// Fits the tires and the effects together.
+    /// Fits the tires, the background and the effects claimed together; `values` in the order of [`Self::layout`].
     pub(crate) fn fit(
         &self,
-        effects: &[EffectId],
+        named: &[EffectId],
         values: &[f64],
         starts: Option<Vec<[f64; 2]>>,
         windows: &Windows,
         max_iterations: usize,
     ) -> State {
-        let model = self.model(effects, None);
-        let parameters = self.parameters(effects, values, 1.0);
+        let effects = self.layout(named);
+        let model = self.model(&effects, None);
+        let parameters = self.parameters(named, &effects, values, 1.0);
         let fit = shooting::fit(&self.problem(&model, &windows.windows, &parameters, max_iterations), starts);
         State {
-            effects: effects.to_vec(),
+            named: named.to_vec(),
+            effects,
             parameters: fit.parameters.clone(),
             starts: fit.starts.clone(),
             cost: fit.linearization.cost,
@@ -268,11 +327,11 @@ impl<'a> Engine<'a> {
     /// Fits flexible terms on top of a state, whose own parameters stay: an upper bound of what an additive term explains.
     pub(crate) fn fit_flexible(&self, state: &State, flexible: &Flexible, windows: &Windows) -> Vec<f64> {
         const RIDGE: f64 = 1.0;
-        const STEPS: usize = 3;
+        const STEPS: usize = 2;
         let model = self.model(&state.effects, Some(flexible));
         let mut values = state.parameters.clone();
         values.extend(std::iter::repeat_n(0.0, flexible.parameters()));
-        let mut parameters = self.parameters(&state.effects, &values, RIDGE);
+        let mut parameters = self.parameters(&state.named, &state.effects, &values, RIDGE);
         let own = state.parameters.len();
         parameters[..own].iter_mut().for_each(|p| p.free = false);
         let problem = self.problem(&model, &windows.windows, &parameters, STEPS);
@@ -282,13 +341,14 @@ impl<'a> Engine<'a> {
     /// One Jacobian of all parameters of a model.
     pub(crate) fn linearize(
         &self,
+        named: &[EffectId],
         effects: &[EffectId],
         values: &[f64],
         starts: &[[f64; 2]],
         windows: &Windows,
     ) -> Linearization {
         let model = self.model(effects, None);
-        let parameters = self.parameters(effects, values, 1.0);
+        let parameters = self.parameters(named, effects, values, 1.0);
         shooting::linearize(&self.problem(&model, &windows.windows, &parameters, 0), values, starts)
     }
 

@@ -162,6 +162,36 @@ pub struct TirePair {
     pub with_effect: PacejkaParameters,
 }
 
+/// How one effect compared with the model without it and with its rivals.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Canonical name.
+    pub name: &'static str,
+    /// Drop of the cost per residual against the model without it.
+    pub gain: f64,
+    /// How sure that drop is, in standard deviations over blocks.
+    pub z: f64,
+    /// How sure the best of the round beats it, in standard deviations over blocks; 0 for the best.
+    pub behind_z: f64,
+    /// How parallel its signature is to that of the best, tires moving along: 0 to 1.
+    pub alike: f64,
+    /// Its size over a size that matters.
+    pub relative_size: f64,
+    /// How far the tires moved with it, in units of their trust.
+    pub tire_shift: f64,
+}
+
+/// One look at the library: what each refitted effect would add to the model that the others make up.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Look {
+    /// The effect that this look is about; nothing for the last, in which none was found.
+    pub about: Option<&'static str>,
+    /// Cost per residual before.
+    pub cost: f64,
+    /// The effects refitted, best first.
+    pub compared: Vec<Comparison>,
+}
+
 /// Points of the pictures.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Series {
@@ -207,6 +237,10 @@ pub struct Diagnosis {
     pub data_health: DataHealth,
     /// What to drive or record next.
     pub drive_next: Vec<String>,
+    /// How the effects compared: a look for each that is named, then the last look, in which no more was found.
+    pub looks: Vec<Look>,
+    /// Weighted cost per residual with nothing claimed, and after each effect that was taken: about 0.8 is noise.
+    pub search_costs: Vec<f64>,
     /// Points of the pictures.
     #[serde(skip)]
     pub series: Series,

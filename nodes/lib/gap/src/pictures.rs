@@ -127,7 +127,7 @@ fn horizon(engine: &Engine<'_>, nominal: &[f64], null: &State, state: &State, on
             Some([
                 h,
                 error(&[], nominal),
-                error(&[], &null.parameters),
+                error(&null.effects, &null.parameters),
                 error(&state.effects, &state.parameters),
             ])
         })

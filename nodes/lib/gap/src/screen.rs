@@ -4,17 +4,18 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::effects::EffectId;
 use crate::engine::{Engine, State};
+use crate::model::BASE;
 use crate::windows::Windows;
 
 /// What the Jacobian says of a candidate.
 #[derive(Debug, Clone)]
 pub(crate) struct Screened {
     pub(crate) effect: EffectId,
-    /// Drop of the cost that one linear step promises, tires and hold moving along.
+    /// Drop of the cost that one linear step promises, tires and background moving along.
     pub(crate) gain: f64,
     /// That step.
     pub(crate) step: Vec<f64>,
-    /// Standard error of each parameter, tires and hold moving along, at the scatter that the data show.
+    /// Standard error of each parameter, tires and background moving along, at the scatter that the data show.
     pub(crate) error: Vec<f64>,
 }
 
@@ -22,8 +23,11 @@ pub(crate) struct Screened {
 #[derive(Debug, Clone)]
 pub(crate) struct Screening {
     pub(crate) candidates: Vec<Screened>,
-    /// Largest cosine between what two candidates do to the signals, tires and hold moving along.
-    pub(crate) cosine: DMatrix<f64>,
+    information: DMatrix<f64>,
+    /// Rows of the tires, the background and the effects claimed already.
+    own: Vec<usize>,
+    /// Rows of each candidate.
+    rows: Vec<Vec<usize>>,
 }
 
 /// Ridge that keeps an effect that the data do not show from a gain of rounding errors.
@@ -37,88 +41,100 @@ pub(crate) fn screen(
     windows: &Windows,
 ) -> Screening {
     let mut effects = state.effects.clone();
-    effects.extend(candidates);
+    effects.extend(candidates.iter().filter(|c| !state.effects.contains(c)));
+    let named: Vec<EffectId> = state.named.iter().chain(candidates).copied().collect();
     let mut values = state.parameters.clone();
-    let mut places = Vec::new();
-    for effect in candidates {
-        places.push((values.len(), effect.spec().parameters.len()));
+    for effect in &effects[state.effects.len()..] {
         values.extend(Engine::null_values(*effect));
     }
-    // The hold stays a nuisance here whatever is among the candidates.
-    let parameters = engine.parameters(&effects, &values, 1.0);
-    let here = engine.linearize(&effects, &values, &state.starts, windows);
-    let own = state.parameters.len();
+    // A candidate that is part of the background keeps the background's prior here, and is let go where it is looked at.
+    let quiet: Vec<EffectId> =
+        named.iter().filter(|e| engine.usual(**e).is_none() || state.named.contains(e)).copied().collect();
+    let parameters = engine.parameters(&quiet, &effects, &values, 1.0);
+    let free_parameters = engine.parameters(&named, &effects, &values, 1.0);
+    let here = engine.linearize(&quiet, &effects, &values, &state.starts, windows);
     let free: Vec<usize> = (0..values.len()).filter(|&j| parameters[j].free).collect();
-    let nuisance: Vec<usize> = (0..free.len()).filter(|&row| free[row] < own).collect();
     let row_of = |j: usize| free.iter().position(|&f| f == j);
+    let own: Vec<usize> = (0..state.parameters.len()).filter_map(row_of).collect();
+    let place = |effect: EffectId| {
+        let before: usize =
+            effects.iter().take_while(|e| **e != effect).map(|e| e.spec().parameters.len()).sum();
+        BASE + before..BASE + before + effect.spec().parameters.len()
+    };
+    let mut information = here.information;
+    for row in 0..free.len() {
+        information[(row, row)] += LEAST_INFORMATION;
+    }
     let dof = (here.residuals as f64 - 2.0 * state.starts.len() as f64).max(1.0);
     let scatter = (here.cost / dof).max(1.0);
-
-    let pick = |rows: &[usize], columns: &[usize]| {
-        DMatrix::from_fn(rows.len(), columns.len(), |a, b| here.information[(rows[a], columns[b])])
-    };
-    let mut inner = pick(&nuisance, &nuisance);
-    for a in 0..nuisance.len() {
-        inner[(a, a)] += LEAST_INFORMATION;
+    let mut screening = Screening { candidates: Vec::new(), information, own, rows: Vec::new() };
+    for &effect in candidates {
+        let rows: Vec<usize> = place(effect).filter_map(row_of).collect();
+        let others: Vec<usize> = screening.own.iter().filter(|r| !rows.contains(r)).copied().collect();
+        let (mut block, coupling) = screening.reduced(&rows, &others);
+        let mut g = pick_vector(&here.gradient, &rows) - coupling * pick_vector(&here.gradient, &others);
+        for (a, &row) in rows.iter().enumerate() {
+            let j = free[row];
+            if let (Some(tight), Some(loose)) = (parameters[j].prior, free_parameters[j].prior) {
+                block[(a, a)] += loose.sigma.powi(-2) - tight.sigma.powi(-2);
+                g[a] += (values[j] - loose.mean) * (loose.sigma.powi(-2) - tight.sigma.powi(-2));
+            }
+        }
+        let n = rows.len();
+        screening.candidates.push(match block.try_inverse() {
+            Some(inverse) => Screened {
+                effect,
+                gain: (g.transpose() * &inverse * &g)[(0, 0)],
+                step: (-(&inverse * &g)).iter().copied().collect(),
+                error: (0..n).map(|a| (inverse[(a, a)].max(0.0) * scatter).sqrt()).collect(),
+            },
+            None => Screened { effect, gain: 0.0, step: vec![0.0; n], error: vec![f64::INFINITY; n] },
+        });
+        screening.rows.push(rows);
     }
-    let inverse = inner.try_inverse().unwrap_or_else(|| DMatrix::zeros(nuisance.len(), nuisance.len()));
-    let inner_gradient = DVector::from_iterator(nuisance.len(), nuisance.iter().map(|&r| here.gradient[r]));
-
-    let blocks: Vec<Vec<usize>> =
-        places.iter().map(|&(from, n)| (from..from + n).filter_map(row_of).collect()).collect();
-    let all: Vec<usize> = blocks.iter().flatten().copied().collect();
-    let cross = pick(&nuisance, &all);
-    let reduced = pick(&all, &all) - cross.transpose() * &inverse * &cross;
-    let gradient = DVector::from_iterator(all.len(), all.iter().map(|&r| here.gradient[r]))
-        - cross.transpose() * &inverse * &inner_gradient;
-
-    let mut at = 0;
-    let spans: Vec<(usize, usize)> = blocks
-        .iter()
-        .map(|b| {
-            at += b.len();
-            (at - b.len(), b.len())
-        })
-        .collect();
-    let candidates_out = candidates
-        .iter()
-        .zip(&spans)
-        .map(|(&effect, &(from, n))| {
-            let mut block = reduced.view((from, from), (n, n)).into_owned();
-            for a in 0..n {
-                block[(a, a)] += LEAST_INFORMATION;
-            }
-            let g = gradient.rows(from, n).into_owned();
-            match block.clone().try_inverse() {
-                Some(inverse) => {
-                    let step = -(&inverse * &g);
-                    Screened {
-                        effect,
-                        gain: (g.transpose() * &inverse * &g)[(0, 0)],
-                        step: step.iter().copied().collect(),
-                        error: (0..n).map(|a| (inverse[(a, a)].max(0.0) * scatter).sqrt()).collect(),
-                    }
-                }
-                None => Screened { effect, gain: 0.0, step: vec![0.0; n], error: vec![f64::INFINITY; n] },
-            }
-        })
-        .collect();
-    let cosine = DMatrix::from_fn(spans.len(), spans.len(), |i, j| cosine(&reduced, spans[i], spans[j]));
-    Screening { candidates: candidates_out, cosine }
+    screening
 }
 
-/// The largest canonical correlation of two blocks.
-fn cosine(information: &DMatrix<f64>, a: (usize, usize), b: (usize, usize)) -> f64 {
-    let block = |r: (usize, usize), c: (usize, usize)| information.view((r.0, c.0), (r.1, c.1)).into_owned();
-    let root = |m: DMatrix<f64>| {
-        let n = m.nrows();
-        (m + DMatrix::identity(n, n) * LEAST_INFORMATION).cholesky().and_then(|c| c.l().try_inverse())
-    };
-    match (root(block(a, a)), root(block(b, b))) {
-        (Some(la), Some(lb)) => {
-            let m = la * block(a, b) * lb.transpose();
-            m.singular_values().max().clamp(0.0, 1.0)
+fn pick_vector(v: &DVector<f64>, rows: &[usize]) -> DVector<f64> {
+    DVector::from_iterator(rows.len(), rows.iter().map(|&r| v[r]))
+}
+
+impl Screening {
+    /// The information on `rows` with `others` moving along, and how others' gradients come in.
+    fn reduced(&self, rows: &[usize], others: &[usize]) -> (DMatrix<f64>, DMatrix<f64>) {
+        let pick = |a: &[usize], b: &[usize]| {
+            DMatrix::from_fn(a.len(), b.len(), |i, j| self.information[(a[i], b[j])])
+        };
+        let cross = pick(rows, others);
+        let coupling = match pick(others, others).cholesky() {
+            Some(c) => c.solve(&cross.transpose()).transpose(),
+            None => DMatrix::zeros(rows.len(), others.len()),
+        };
+        (pick(rows, rows) - &coupling * cross.transpose(), coupling)
+    }
+
+    /// How alike two candidates look, tires and background moving along: the largest canonical correlation of what they do to the signals.
+    pub(crate) fn cosine(&self, a: EffectId, b: EffectId) -> f64 {
+        let place = |e: EffectId| self.candidates.iter().position(|c| c.effect == e);
+        let (Some(a), Some(b)) = (place(a), place(b)) else { return 0.0 };
+        let (a, b) = (&self.rows[a], &self.rows[b]);
+        let others: Vec<usize> =
+            self.own.iter().filter(|r| !a.contains(r) && !b.contains(r)).copied().collect();
+        let rows: Vec<usize> = a.iter().chain(b).copied().collect();
+        let (both, _) = self.reduced(&rows, &others);
+        let (n, m) = (a.len(), b.len());
+        let root = |from: usize, len: usize| {
+            let block = both.view((from, from), (len, len)).into_owned();
+            (block + DMatrix::identity(len, len) * LEAST_INFORMATION)
+                .cholesky()
+                .and_then(|c| c.l().try_inverse())
+        };
+        match (root(0, n), root(n, m)) {
+            (Some(la), Some(lb)) => {
+                let product = la * both.view((0, n), (n, m)) * lb.transpose();
+                product.singular_values().max().clamp(0.0, 1.0)
+            }
+            _ => 0.0,
         }
-        _ => 0.0,
     }
 }

@@ -12,29 +12,32 @@ use crate::windows::Windows;
 pub(crate) mod thresholds {
     /// Candidates refitted in the first round, and in later rounds.
     pub(crate) const REFITS: [usize; 2] = [9, 6];
+    /// How many of them are fitted to the end, and how far behind the best, in shares of its gain, they may lie after a first look.
+    pub(crate) const FINALISTS: usize = 4;
+    pub(crate) const OUT_OF_REACH: f64 = 0.7;
     /// Candidates that promise less than this share of the best one's gain, or of the cost, are not refitted.
     pub(crate) const WORTH_OF_BEST: f64 = 0.12;
     pub(crate) const WORTH_OF_COST: f64 = 0.01;
     /// Effects taken at most.
-    pub(crate) const MOST_EFFECTS: usize = 4;
+    pub(crate) const MOST_EFFECTS: usize = 3;
     /// Weighted cost per residual that noise alone leaves.
     pub(crate) const NOISE_COST: f64 = 0.75;
     /// Drop of the weighted cost per residual below which an effect does not matter.
-    pub(crate) const LEAST_GAIN: f64 = 0.11;
+    pub(crate) const LEAST_GAIN: f64 = 0.045;
     /// Weighted cost per residual up to which there is no gap to explain.
-    pub(crate) const SMALL_COST: f64 = 1.15;
+    pub(crate) const SMALL_COST: f64 = 1.45;
     /// Share of the remaining weighted cost that a first and a later effect must close.
     pub(crate) const LEAST_SHARE: [f64; 2] = [0.10, 0.12];
     /// How sure it must be that a candidate beats the current model, in standard deviations over blocks.
-    pub(crate) const LEAST_Z: f64 = 3.0;
-    /// Sum of squares, in units of their trust, beyond which retuned tires ask for another explanation.
-    pub(crate) const FAR_SHIFT: f64 = 12.0;
-    /// How many times tighter the tires are held while one is looked for.
-    pub(crate) const HELD_TIRES: f64 = 50.0;
-    /// Share of the retune's shift that the tires may still move beside such an effect.
-    pub(crate) const NEARER: f64 = 0.4;
+    pub(crate) const LEAST_Z: f64 = 2.0;
+    /// The same for an effect that sits in one place of the lap: most blocks do not hold it.
+    pub(crate) const LEAST_PLACE_Z: f64 = 1.2;
+    /// Largest effect that is believed, over the size that matters: what needs more stands in for something else.
+    pub(crate) const MOST_SIZE: f64 = 4.5;
     /// Smallest effect that is named, over the size that matters.
-    pub(crate) const LEAST_SIZE: f64 = 0.35;
+    pub(crate) const LEAST_SIZE: f64 = 0.1;
+    /// The same for an effect that every car has a little of, over what is usual.
+    pub(crate) const LEAST_OVER_USUAL: f64 = 1.3;
     /// Candidates whose refits cannot be told apart by this many standard deviations are confused.
     pub(crate) const CONFUSED_Z: f64 = 1.64;
     /// Candidates whose signatures are this parallel are confused.
@@ -64,10 +67,12 @@ pub(crate) struct Round {
     /// Chance that the best beats each of the others, in standard deviations.
     pub(crate) lead_z: Vec<f64>,
     pub(crate) screening: Screening,
-    /// The place of the effect taken, if one was.
-    pub(crate) taken: Option<usize>,
+    /// Whether the best is good enough to be taken.
+    pub(crate) taken: bool,
     /// The model before it.
     pub(crate) before: State,
+    /// The block of each window that it was fitted on.
+    pub(crate) blocks: Vec<usize>,
 }
 
 /// Mean square of each channel's residuals over the noise variance: median over windows.
@@ -112,11 +117,13 @@ pub(crate) fn reweigh(engine: &mut Engine<'_>, state: &State, windows: &Windows)
 }
 
 /// How much lower the cost of `b` is, and how sure that is: the t statistic over blocks of the signed roots of the differences. The roots keep a
-/// gain that is everywhere, but large in one place, from looking unsure.
+/// gain that is everywhere, but large in one place, from looking unsure. What the priors make of the difference is spread over the blocks.
 pub(crate) fn difference(windows: &Windows, a: &State, b: &State) -> (f64, f64) {
+    let prior = |s: &State| s.cost - s.window_costs.iter().sum::<f64>();
+    let each = (prior(a) - prior(b)) / windows.windows.len().max(1) as f64;
     let mut blocks: Vec<(usize, f64)> = Vec::new();
     for (k, &block) in windows.block.iter().enumerate() {
-        let d = a.window_costs[k] - b.window_costs[k];
+        let d = a.window_costs[k] - b.window_costs[k] + each;
         match blocks.last_mut().filter(|l| l.0 == block) {
             Some(last) => last.1 += d,
             None => blocks.push((block, d)),
@@ -131,18 +138,18 @@ pub(crate) fn difference(windows: &Windows, a: &State, b: &State) -> (f64, f64) 
     (sum, mean / (variance / n).sqrt())
 }
 
-/// Refits one candidate on top of a state: from the linear step, and from its own starts; the best counts.
-fn refit(
+/// A first look at one candidate on top of a state: a few steps from the linear step, and from its own starts; the best counts.
+fn first_look(
     engine: &Engine<'_>,
     state: &State,
     screened: &Screened,
     windows: &Windows,
     extra: &[Vec<f64>],
-) -> Refit {
-    const FIRST: usize = 2;
-    const REST: usize = 5;
+) -> Option<State> {
     let effect = screened.effect;
     let spec = effect.spec();
+    // Where the derivative at the null says nothing, the start is a guess.
+    let steps = if spec.flat_at_null { 4 } else { 2 };
     let clamp = |values: Vec<f64>| -> Vec<f64> {
         values
             .into_iter()
@@ -155,36 +162,50 @@ fn refit(
     };
     let mut starts: Vec<Vec<f64>> = extra.to_vec();
     if !spec.flat_at_null {
-        starts.push(clamp(spec.parameters.iter().zip(&screened.step).map(|(p, s)| p.null + s).collect()));
+        let from = state.of(effect).map_or_else(|| Engine::null_values(effect), <[f64]>::to_vec);
+        starts.push(clamp(from.iter().zip(&screened.step).map(|(v, s)| v + s).collect()));
     }
     if extra.is_empty() {
         for m in spec.starts.iter().filter(|m| **m != 0.0) {
             starts.push(clamp(spec.parameters.iter().map(|p| p.null + m * engine.size(p)).collect()));
         }
     }
-    let mut effects = state.effects.clone();
-    effects.push(effect);
-    let attempt = |values: &[f64], starts: &[[f64; 2]], steps: usize| {
-        engine.fit(&effects, values, Some(starts.to_vec()), windows, steps)
-    };
-    let best = starts
+    let mut named = state.named.clone();
+    named.push(effect);
+    let carried = engine.carry(state, &named);
+    let before = carried.len() - spec.parameters.len();
+    starts
         .iter()
         .map(|own| {
-            let mut values = state.parameters.clone();
-            values.extend(own);
-            attempt(&values, &state.starts, FIRST)
+            let values: Vec<f64> = carried[..before].iter().chain(own).copied().collect();
+            engine.fit(&named, &values, Some(state.starts.clone()), windows, steps)
         })
         .filter(|s| s.finite)
-        .min_by(|a, b| a.cost.total_cmp(&b.cost));
-    let done = match best {
-        Some(best) => attempt(&best.parameters, &best.starts, REST),
-        None => state.clone(),
-    };
-    let (gain, z) =
-        if done.effects.len() == effects.len() { difference(windows, state, &done) } else { (0.0, 0.0) };
-    let own = done.of(effect).unwrap_or(&[]);
-    let relative_size = relative_size(engine, effect, own);
-    Refit { effect, gain, z, relative_size, state: done }
+        .min_by(|a, b| a.cost.total_cmp(&b.cost))
+}
+
+/// Fits to the end those of the first looks that may still win.
+fn refits(engine: &Engine<'_>, state: &State, looks: Vec<State>, windows: &Windows) -> Vec<Refit> {
+    const STEPS: usize = 5;
+    let mut looks = looks;
+    looks.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let best = looks.first().map_or(0.0, |s| s.cost);
+    looks
+        .into_iter()
+        .enumerate()
+        .map(|(i, look)| {
+            let close = look.cost - best < thresholds::OUT_OF_REACH * (state.cost - best).max(0.0);
+            let done = if i < thresholds::FINALISTS && close {
+                engine.fit(&look.named, &look.parameters, Some(look.starts.clone()), windows, STEPS)
+            } else {
+                look
+            };
+            let effect = done.named[done.named.len() - 1];
+            let (gain, z) = difference(windows, state, &done);
+            let relative_size = relative_size(engine, effect, done.of(effect).unwrap_or(&[]));
+            Refit { effect, gain, z, relative_size, state: done }
+        })
+        .collect()
 }
 
 /// The largest parameter over its size; of effects whose later parameters only place them, the first.
@@ -209,8 +230,8 @@ fn patch_starts(engine: &Engine<'_>, state: &State, windows: &Windows) -> Vec<Ve
             let start = i as f64 / PLACES as f64;
             let mut values = state.parameters.clone();
             values.extend([0.0, start, length]);
-            let here = engine.linearize(&effects, &values, &state.starts, windows);
-            let parameters = engine.parameters(&effects, &values, 1.0);
+            let here = engine.linearize(&effects, &effects, &values, &state.starts, windows);
+            let parameters = engine.parameters(&effects, &effects, &values, 1.0);
             let free: Vec<usize> = (0..values.len()).filter(|&j| parameters[j].free).collect();
             let row = free.iter().position(|&j| j == state.parameters.len());
             let gain = row.map_or(0.0, |r| {
@@ -222,7 +243,7 @@ fn patch_starts(engine: &Engine<'_>, state: &State, windows: &Windows) -> Vec<Ve
         .collect();
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let depth = engine.size(&spec.parameters[0]);
-    found.iter().take(2).map(|&(_, start)| vec![depth, start, length]).collect()
+    found.iter().take(3).map(|&(_, start)| vec![depth, start, length]).collect()
 }
 
 /// One round: screens, refits the best, and says whether one is taken.
@@ -233,7 +254,7 @@ pub(crate) fn round(
     windows: &Windows,
     number: usize,
 ) -> Round {
-    let left: Vec<EffectId> = candidates.iter().copied().filter(|e| !state.effects.contains(e)).collect();
+    let left: Vec<EffectId> = candidates.iter().copied().filter(|e| !state.named.contains(e)).collect();
     let visible: Vec<EffectId> = left.iter().copied().filter(|e| !e.spec().flat_at_null).collect();
     let screening = screen(engine, state, &visible, windows);
     let mut order: Vec<&Screened> = screening.candidates.iter().collect();
@@ -241,33 +262,28 @@ pub(crate) fn round(
     let count = thresholds::REFITS[number.min(1)];
     let top = order.first().map_or(0.0, |s| s.gain);
     let worth = (thresholds::WORTH_OF_BEST * top).max(thresholds::WORTH_OF_COST * state.cost);
-    let mut refits: Vec<Refit> = order
+    let mut looks: Vec<State> = order
         .into_iter()
         .take(count)
         .enumerate()
         .filter(|(i, s)| *i == 0 || s.gain > worth)
-        .map(|(_, s)| refit(engine, state, s, windows, &[]))
+        .filter_map(|(_, s)| first_look(engine, state, s, windows, &[]))
         .collect();
     for &effect in left.iter().filter(|e| e.spec().flat_at_null) {
         let n = effect.spec().parameters.len();
         let blank = Screened { effect, gain: 0.0, step: vec![0.0; n], error: vec![f64::INFINITY; n] };
         let extra =
             if effect == EffectId::LowGripPatch { patch_starts(engine, state, windows) } else { Vec::new() };
-        refits.push(refit(engine, state, &blank, windows, &extra));
+        looks.extend(first_look(engine, state, &blank, windows, &extra));
     }
+    let mut refits = refits(engine, state, looks, windows);
     refits.sort_by(|a, b| score(b).total_cmp(&score(a)));
     prefer_simple(&mut refits);
     let mut before = state.clone();
     if let Some(best) = refits.first() {
         // The model without the effect may have been stuck where the winner is not.
-        let own = state.parameters.len();
-        let again = engine.fit(
-            &state.effects,
-            &best.state.parameters[..own],
-            Some(best.state.starts.clone()),
-            windows,
-            10,
-        );
+        let values = engine.carry(&best.state, &state.named);
+        let again = engine.fit(&state.named, &values, Some(best.state.starts.clone()), windows, 10);
         if again.finite && again.cost < before.cost {
             before = again;
         }
@@ -275,14 +291,41 @@ pub(crate) fn round(
     for r in &mut refits {
         (r.gain, r.z) = difference(windows, &before, &r.state);
     }
-    let lead_z = refits.iter().map(|r| difference(windows, &r.state, &refits[0].state).1).collect();
-    let taken = refits.iter().take(1).position(|r| acceptable(r, &before, number));
-    Round { refits, lead_z, screening, taken, before }
+    let mut round =
+        Round { refits, lead_z: Vec::new(), screening, taken: false, before, blocks: windows.block.clone() };
+    round.compare(windows);
+    round.taken = round.winner().is_some_and(|r| acceptable(engine, r, &round.before, number));
+    round
+}
+
+impl Round {
+    /// The best candidate.
+    pub(crate) fn winner(&self) -> Option<&Refit> {
+        self.refits.first()
+    }
+
+    fn compare(&mut self, windows: &Windows) {
+        self.lead_z = match self.refits.first() {
+            Some(best) => self.refits.iter().map(|r| difference(windows, &r.state, &best.state).1).collect(),
+            None => Vec::new(),
+        };
+    }
+
+    /// Puts one more candidate into its place.
+    pub(crate) fn insert(&mut self, refit: Refit, windows: &Windows) -> usize {
+        let place = self.refits.partition_point(|r| score(r) > score(&refit));
+        self.refits.insert(place, refit);
+        self.compare(windows);
+        place
+    }
 }
 
 /// What candidates are ranked by: the drop of the cost, less a price for every parameter.
 fn score(r: &Refit) -> f64 {
     const PRICE: f64 = 6.0;
+    if r.relative_size >= thresholds::MOST_SIZE {
+        return 0.0;
+    }
     r.gain - PRICE * r.effect.spec().parameters.len() as f64
 }
 
@@ -299,12 +342,27 @@ fn prefer_simple(refits: &mut [Refit]) {
     }
 }
 
+/// Whether a model is still needed beside a simpler one.
+pub(crate) fn needed(simpler: &State, state: &State) -> bool {
+    let residuals = state.residuals();
+    let loss = simpler.cost - state.cost;
+    let remaining = (simpler.cost - thresholds::NOISE_COST * residuals).max(0.05 * simpler.cost);
+    loss > thresholds::LEAST_GAIN * residuals && loss > thresholds::LEAST_SHARE[1] * remaining
+}
+
 /// Whether the best candidate is real, big enough to matter, and closes enough of what remains.
-fn acceptable(r: &Refit, before: &State, number: usize) -> bool {
+fn acceptable(engine: &Engine<'_>, r: &Refit, before: &State, number: usize) -> bool {
+    let least_size = match (engine.usual(r.effect), r.effect.spec().parameters) {
+        (Some(usual), [first, ..]) => thresholds::LEAST_OVER_USUAL * usual / engine.size(first),
+        _ => thresholds::LEAST_SIZE,
+    };
     let residuals = before.residuals();
     let remaining = (before.cost - thresholds::NOISE_COST * residuals).max(0.05 * before.cost);
-    r.z > thresholds::LEAST_Z
+    let least_z =
+        if r.effect == EffectId::LowGripPatch { thresholds::LEAST_PLACE_Z } else { thresholds::LEAST_Z };
+    r.z > least_z
+        && r.relative_size < thresholds::MOST_SIZE
         && r.gain > thresholds::LEAST_GAIN * residuals
         && r.gain > thresholds::LEAST_SHARE[number.min(1)] * remaining
-        && r.relative_size > thresholds::LEAST_SIZE
+        && r.relative_size > least_size
 }

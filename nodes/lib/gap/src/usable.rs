@@ -81,6 +81,8 @@ pub(crate) fn refused(request: &Request<'_>, error: &GapError, data_health: Data
         tires: TirePair { without_effect: tires, with_effect: tires },
         data_health,
         drive_next: vec![next.to_owned()],
+        looks: Vec::new(),
+        search_costs: Vec::new(),
         series: Series::default(),
     }
 }

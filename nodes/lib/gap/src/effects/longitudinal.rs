@@ -18,13 +18,7 @@ impl Effect for AeroDrag {
             "F_x -= c m v^2 (m nominal)",
             "drag of a bluff body",
             "top speed",
-            &[ParameterSpec {
-                name: "c_1pm",
-                unit: "1/m",
-                null: 0.0,
-                size: [8e-3, 8e-4],
-                range: [-1.0, 5.0],
-            }],
+            &[ParameterSpec { name: "c_1pm", unit: "1/m", null: 0.0, size: [8e-3, 8e-4], range: [0.0, 5.0] }],
         )
     };
 
@@ -45,7 +39,7 @@ impl Effect for RollingResistance {
             "F_x -= c m g",
             "hysteresis of the rolling tire",
             "any drive",
-            &[ParameterSpec { name: "c", unit: "1", null: 0.0, size: [0.03, 0.015], range: [-1.0, 5.0] }],
+            &[ParameterSpec { name: "c", unit: "1", null: 0.0, size: [0.03, 0.015], range: [0.0, 5.0] }],
         )
     };
 

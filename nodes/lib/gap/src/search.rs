@@ -1,0 +1,145 @@
+//! The search for several effects: one after the other, what became needless dropped again, and every one challenged at the end.
+
+use crate::effects::EffectId;
+use crate::engine::{Engine, State};
+use crate::select::{Refit, Round, difference, needed, relative_size, reweigh, round, thresholds};
+use crate::windows::Windows;
+
+/// What a search has come to.
+#[derive(Debug, Clone)]
+pub(crate) struct Found {
+    /// The model with the effects that are claimed.
+    pub(crate) state: State,
+    /// For each of them, in the order of `state.named`: what else was tried in its place.
+    pub(crate) evidence: Vec<Round>,
+    /// The last look, in which nothing more was found.
+    pub(crate) last: Round,
+    /// Cost per residual with nothing claimed, and with each effect more.
+    pub(crate) costs: Vec<f64>,
+}
+
+/// A delay that is not enough, so that a lag is needed beside it, is a lag of higher order: a servo, a filter. It goes by the lag's name.
+const DELAY_AND_LAG: [[EffectId; 2]; 2] =
+    [[EffectId::SteeringDelay, EffectId::SteeringLag], [EffectId::OdometryDelay, EffectId::OdometryLowPass]];
+/// Rounds at most.
+const ROUNDS: usize = 6;
+/// Iterations of the fit after a change of the weights.
+const SETTLE: usize = 8;
+
+/// Searches from the model without any effect.
+pub(crate) fn search(
+    engine: &mut Engine<'_>,
+    null: &State,
+    library: &[EffectId],
+    windows: &Windows,
+    progress: &mut dyn FnMut(&str),
+) -> Found {
+    let mut library = library.to_vec();
+    let mut state = null.clone();
+    let mut evidence: Vec<Round> = Vec::new();
+    let mut costs = vec![null.cost / null.residuals()];
+    let mut number = 0;
+    let last = loop {
+        number += 1;
+        progress(&format!("comparing {} effects, round {number}", library.len() - state.named.len()));
+        let here = round(engine, &state, &library, windows, state.named.len());
+        let room = state.named.len() < thresholds::MOST_EFFECTS && number < ROUNDS;
+        let Some(next) = here.winner().filter(|_| here.taken && room).map(|r| r.state.clone()) else {
+            break here;
+        };
+        evidence.push(here);
+        state = settled(engine, &next, windows);
+        for [delay, lag] in DELAY_AND_LAG {
+            let place = |e: EffectId| state.named.iter().position(|n| *n == e);
+            if let (Some(from), Some(to)) = (place(delay), place(lag)) {
+                // What was compared when the first of the two was found says how sure the pair is.
+                evidence.remove(from.max(to));
+                state = without(engine, &state, delay, windows);
+                library.retain(|e| *e != delay);
+            }
+        }
+        drop_needless(engine, &mut state, &mut evidence, windows);
+        costs.push(state.cost / state.residuals());
+    };
+    let mut found = Found { state, evidence, last, costs };
+    if found.state.named.len() > 1 {
+        progress("challenging each effect found");
+        found.challenge(engine, &library, windows);
+    }
+    found
+}
+
+fn settled(engine: &mut Engine<'_>, state: &State, windows: &Windows) -> State {
+    reweigh(engine, state, windows);
+    engine.fit(&state.named, &state.parameters, Some(state.starts.clone()), windows, SETTLE)
+}
+
+/// The model without one of its effects, refitted.
+fn without(engine: &Engine<'_>, state: &State, effect: EffectId, windows: &Windows) -> State {
+    let named: Vec<EffectId> = state.named.iter().copied().filter(|e| *e != effect).collect();
+    engine.fit(&named, &engine.carry(state, &named), Some(state.starts.clone()), windows, SETTLE)
+}
+
+/// A later effect may explain what an earlier one stood in for.
+fn drop_needless(engine: &Engine<'_>, state: &mut State, evidence: &mut Vec<Round>, windows: &Windows) {
+    while state.named.len() > 1 {
+        let newest = state.named.len() - 1;
+        let least = (0..newest)
+            .map(|i| (i, without(engine, state, state.named[i], windows)))
+            .min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+        match least {
+            Some((i, simpler)) if !needed(&simpler, state) => {
+                *state = simpler;
+                evidence.remove(i);
+            }
+            _ => break,
+        }
+    }
+}
+
+impl Found {
+    /// Puts every effect up against all others once more, with the rest of the model in place; then orders them by what each closes.
+    fn challenge(&mut self, engine: &mut Engine<'_>, library: &[EffectId], windows: &Windows) {
+        for i in 0..self.state.named.len() {
+            let effect = self.state.named[i];
+            let base = without(engine, &self.state, effect, windows);
+            let mut here = round(engine, &base, library, windows, 1);
+            let own = match here.refits.iter().position(|r| r.effect == effect) {
+                Some(place) => place,
+                None => {
+                    let mut named = base.named.clone();
+                    named.push(effect);
+                    let values = engine.carry(&self.state, &named);
+                    let state = engine.fit(&named, &values, Some(self.state.starts.clone()), windows, 2);
+                    let (gain, z) = difference(windows, &here.before, &state);
+                    let relative_size = relative_size(engine, effect, state.of(effect).unwrap_or(&[]));
+                    here.insert(Refit { effect, state, gain, z, relative_size }, windows)
+                }
+            };
+            if own > 0 && here.taken {
+                // Another one does better.
+                if let Some(better) = here.winner() {
+                    self.state = settled(engine, &better.state.clone(), windows);
+                }
+                self.evidence.remove(i);
+                self.evidence.push(here);
+                return self.challenge_order(engine, windows);
+            }
+            self.evidence[i] = here;
+        }
+        self.challenge_order(engine, windows);
+    }
+
+    fn challenge_order(&mut self, engine: &Engine<'_>, windows: &Windows) {
+        let gain = |r: &Round, e: EffectId| r.refits.iter().find(|x| x.effect == e).map_or(0.0, |x| x.gain);
+        let mut pairs: Vec<(EffectId, Round)> =
+            self.state.named.iter().copied().zip(std::mem::take(&mut self.evidence)).collect();
+        pairs.sort_by(|a, b| gain(&b.1, b.0).total_cmp(&gain(&a.1, a.0)));
+        let named: Vec<EffectId> = pairs.iter().map(|p| p.0).collect();
+        self.evidence = pairs.into_iter().map(|p| p.1).collect();
+        if named != self.state.named {
+            let values = engine.carry(&self.state, &named);
+            self.state = engine.fit(&named, &values, Some(self.state.starts.clone()), windows, 2);
+        }
+    }
+}
