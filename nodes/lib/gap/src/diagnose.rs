@@ -102,7 +102,7 @@ fn explain(
     let (verdict, mut reasons) = decide(&budget, &last, &state, &costs);
     reasons.extend(crate::noise::caveat(&recording));
     let blocks = &windows.training.block;
-    let effects = rank(&evidence, &last, &state, &budget, blocks);
+    let effects = rank(&evidence, &last, &state, &budget, blocks, costs.last().copied().unwrap_or(f64::NAN));
     let scored_windows =
         if windows.held_out.windows.is_empty() { &windows.training } else { &windows.held_out };
     let on_all = split(&recording, false).training;

@@ -16,18 +16,18 @@ pub(crate) mod thresholds {
     pub(crate) const FINALISTS: usize = 4;
     pub(crate) const OUT_OF_REACH: f64 = 0.7;
     /// Candidates that promise less than this share of the best one's gain, or of the cost, are not refitted.
-    pub(crate) const WORTH_OF_BEST: f64 = 0.12;
+    pub(crate) const WORTH_OF_BEST: f64 = 0.06;
     pub(crate) const WORTH_OF_COST: f64 = 0.01;
     /// Effects taken at most.
     pub(crate) const MOST_EFFECTS: usize = 3;
     /// Weighted cost per residual that noise alone leaves.
     pub(crate) const NOISE_COST: f64 = 0.75;
     /// Drop of the weighted cost per residual below which an effect does not matter.
-    pub(crate) const LEAST_GAIN: f64 = 0.045;
+    pub(crate) const LEAST_GAIN: f64 = 0.03;
     /// Weighted cost per residual up to which there is no gap to explain.
-    pub(crate) const SMALL_COST: f64 = 1.45;
+    pub(crate) const SMALL_COST: f64 = 1.3;
     /// Share of the remaining weighted cost that a first and a later effect must close.
-    pub(crate) const LEAST_SHARE: [f64; 2] = [0.10, 0.12];
+    pub(crate) const LEAST_SHARE: [f64; 2] = [0.08, 0.12];
     /// How sure it must be that a candidate beats the current model, in standard deviations over blocks.
     pub(crate) const LEAST_Z: f64 = 2.0;
     /// The same for an effect that sits in one place of the lap: most blocks do not hold it.

@@ -12,6 +12,10 @@ use crate::sizes::sizes;
 const WORSE: f64 = 1.2;
 /// Share of what the retuned tires leave that the named effects must explain, where they leave more than is usual.
 const LEAST_EXPLAINED: f64 = 0.65;
+/// Share of what is left that flexible terms explain from which something is missing in the model; less is scatter.
+const EXPLAINABLE: f64 = 0.2;
+/// Weighted cost per residual that is too much for scatter.
+const HUGE_COST: f64 = 4.0;
 /// Excess of the nominal over the retuned model that makes it a retune.
 const RETUNE_EXCESS: f64 = 0.1;
 
@@ -27,16 +31,14 @@ pub(crate) fn decide(budget: &Budget, last: &Round, state: &State, costs: &[f64]
     }
     let left = costs.last().copied().unwrap_or(f64::NAN);
     let small = left < thresholds::SMALL_COST;
+    let explainable = (after - ceiling) / (after - 1.0).max(1e-9);
     if state.named.is_empty() {
-        if small {
+        if small || (left < HUGE_COST && explainable < EXPLAINABLE) {
             let retune = nominal - retuned > RETUNE_EXCESS;
             reasons.push("what is left after retuning the tires is within noise and the usual imperfection of the model".to_owned());
             return (if retune { Verdict::TireRetuneOnly } else { Verdict::NoGap }, reasons);
         }
-        reasons.push(format!(
-            "what is left is {left:.2} times what is usual, and flexible terms would explain {:.0} % of it",
-            100.0 * (retuned - ceiling) / (retuned - 1.0).max(1e-9)
-        ));
+        reasons.push(format!("flexible terms would explain {:.0} % of what is left", 100.0 * explainable));
         if let Some(best) = last.winner() {
             reasons.push(format!(
                 "the best effect, {}, does not explain enough of it to be named",
@@ -46,9 +48,12 @@ pub(crate) fn decide(budget: &Budget, last: &Round, state: &State, costs: &[f64]
         return (Verdict::NoneOfThese, reasons);
     }
     let closed = (retuned - after) / (retuned - 1.0).max(1e-9);
-    reasons
-        .push(format!("the named effects explain {:.0} % of what the retuned tires leave", 100.0 * closed));
-    if !small && closed < LEAST_EXPLAINED {
+    reasons.push(format!(
+        "the named effects explain {:.0} % of what the retuned tires leave; flexible terms would explain {:.0} % of the rest",
+        100.0 * closed,
+        100.0 * explainable
+    ));
+    if !small && closed < LEAST_EXPLAINED && explainable > EXPLAINABLE {
         reasons.push("that is too little: the cause is not, or not only, in the library".to_owned());
         return (Verdict::NoneOfThese, reasons);
     }
@@ -62,6 +67,7 @@ pub(crate) fn rank(
     state: &State,
     budget: &Budget,
     blocks: &[usize],
+    left: f64,
 ) -> Vec<RankedEffect> {
     let mut out: Vec<RankedEffect> = Vec::new();
     for (step, (&effect, round)) in state.named.iter().zip(evidence).enumerate() {
@@ -71,7 +77,7 @@ pub(crate) fn rank(
             accepted: true,
             parameters: sizes(state, effect, blocks),
             gap_closed_fraction: budget.closed_by_step(step + 1),
-            confidence: confidence(round, effect, &confused),
+            confidence: confidence(round, effect, &confused, left),
             confused_with: confused.iter().map(|e| e.name()).collect(),
         });
     }
@@ -133,10 +139,14 @@ fn confused(round: &Round, effect: EffectId) -> Vec<EffectId> {
 }
 
 /// Chance that the winner of a round is the cause: that it beats the model without it, and every rival outside its group.
-fn confidence(round: &Round, effect: EffectId, confused: &[EffectId]) -> f64 {
+fn confidence(round: &Round, effect: EffectId, confused: &[EffectId], left: f64) -> f64 {
     /// Leads are less sure than their standard deviation says: models are wrong in ways that blocks share.
     const DOUBT: f64 = 2.5;
-    const MOST: f64 = 0.98;
+    const MOST: f64 = 0.97;
+    /// A drop of the cost per residual that is as likely as not something else.
+    const FAINT: f64 = 0.015;
+    /// Sizes beyond this, over the size that matters, are seldom true.
+    const LARGE: f64 = 3.2;
     let Some(best) = round.refits.iter().find(|r| r.effect == effect) else { return 0.0 };
     let rival = round
         .refits
@@ -147,7 +157,17 @@ fn confidence(round: &Round, effect: EffectId, confused: &[EffectId]) -> f64 {
         .fold(f64::INFINITY, f64::min);
     let sure = |z: f64| normal(z / DOUBT);
     let alone = 1.0 / (1.0 + confused.len() as f64 * 0.5);
-    (sure(best.z) * if rival.is_finite() { sure(rival) } else { 1.0 } * alone).min(MOST)
+    let gain = best.gain / round.before.residuals();
+    let clear = (gain / (gain + FAINT)).max(0.5);
+    let believable = if best.relative_size > LARGE { 0.5 } else { 1.0 };
+    let explained = if left < thresholds::SMALL_COST { 1.0 } else { 0.6 };
+    (sure(best.z.max(2.0 * DOUBT))
+        * if rival.is_finite() { sure(rival) } else { 1.0 }
+        * alone
+        * clear
+        * believable
+        * explained)
+        .min(MOST)
 }
 
 /// Standard normal distribution function (Abramowitz and Stegun 26.2.17, error below 1e-7).

@@ -100,6 +100,8 @@ fn diagnosis() -> Diagnosis {
             recorded: vec!["x_m"],
         },
         drive_next: vec!["to tell steering_delay from steering_lag: steering to 3 Hz".into()],
+        looks: Vec::new(),
+        search_costs: Vec::new(),
         series: Series {
             tire_curves: [curve(0.5).collect(), curve(0.45).collect()],
             slip_driven_rad: [0.16, 0.12],
