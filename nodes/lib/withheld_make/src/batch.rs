@@ -256,13 +256,13 @@ fn left_out(planned: &Planned, random: &mut ChaCha8Rng) -> Vec<String> {
     draw::left_out(&planned.effects, deleted, random)
 }
 
-/// Where the diagnosis does not have the true effect: all effects that it has, at their typical size.
+/// Where the diagnosis has to do without the true effect: all effects that it has, at their typical size.
 fn stand_ins(
     planned: &Planned,
     without: &[String],
     scenario: &Scenario,
 ) -> Result<Vec<EffectSetting>, WithheldError> {
-    if !matches!(planned.kind, Kind::Deleted | Kind::OutOfLibrary) {
+    if planned.kind != Kind::Deleted {
         return Ok(Vec::new());
     }
     let mut names = draw::names(true);

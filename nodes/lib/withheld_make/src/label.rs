@@ -56,8 +56,8 @@ pub struct OracleFit {
     pub size_ratio: f64,
     /// Squared response that neither tires nor start states imitate, over the noise, per residual.
     pub chi2_per_residual: f64,
-    /// What the best remaining effect of the library would leave of it, in the same measure; for effects that the diagnosis
-    /// does not have.
+    /// What the best remaining effect of the library would leave of it, in the same measure; for effects that were left
+    /// out.
     pub excess_without: Option<f64>,
 }
 

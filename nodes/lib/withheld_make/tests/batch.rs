@@ -37,8 +37,7 @@ fn what_drives_show(labels: &[CaseLabel]) {
                 fit.severity.is_finite() && fit.severity >= 0.0 && fit.size_ratio.is_finite(),
                 "{label:?}"
             );
-            let unknown = matches!(label.kind, Kind::Deleted | Kind::OutOfLibrary);
-            assert_eq!(fit.excess_without.is_some(), unknown);
+            assert_eq!(fit.excess_without.is_some(), label.kind == Kind::Deleted);
             // A stand-in explains some of it, never more than there is.
             assert!(
                 fit.excess_without.is_none_or(|left| left >= 0.0 && left <= 1.001 * fit.chi2_per_residual)
