@@ -72,7 +72,7 @@ fn a_small_batch_is_made_diagnosed_and_scored() {
     assert!(page.contains("<svg") && page.contains("Shrinkage") && !page.contains("NaN"));
 
     let labels = fs::read_to_string(folder.join("labels.json")).unwrap();
-    fs::write(folder.join("labels.json"), labels.replacen("\"seed\": 5", "\"seed\": 6", 1)).unwrap();
+    fs::write(folder.join("labels.json"), labels.replacen("\"seed\":5", "\"seed\":6", 1)).unwrap();
     let error = refused(folder, "withheld score cases verdicts --labels labels.json --out report");
     assert!(error.contains("is not the file that cases/commitment.txt was made for"), "{error}");
 }

@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::Args;
+use gripsight_bag::{Role, TopicMap};
 use gripsight_report::{WithheldInput, withheld_page};
+use gripsight_signals::Measurement;
 use gripsight_withheld_make::{CaseLabel, Family, Kind, Labels, files};
 use gripsight_withheld_score::{
     Answer, Control, Outside, Said, Scores, Targets, control, excuse_what_drives_have,
@@ -169,7 +171,14 @@ fn controls(answers: &[Answer], dir: &Path) -> anyhow::Result<BTreeMap<String, C
         let folder = dir.join(&answer.label.case);
         let mut figures = vec![place as f64];
         for name in [files::BAG, files::HELD_OUT] {
-            let info = gripsight_bag::info(&folder.join(name), &gripsight_bag::TopicMap::default())?;
+            let (path, topics) = (folder.join(name), TopicMap::default());
+            let info = gripsight_bag::info(&path, &topics)?;
+            let (measurements, _) = gripsight_bag::read_measurements(&path, &topics)?;
+            let first = |role: Role| {
+                measurements.iter().find(|m| m.stream() == role.name()).map(Measurement::stamp_ns)
+            };
+            let begin = first(Role::Odom).unwrap_or(0);
+            figures.extend(Role::ALL.map(|role| first(role).map_or(0.0, |stamp| (stamp - begin) as f64)));
             figures.extend([info.size_bytes as f64, info.duration_s, info.messages as f64]);
             // Drives may lack a stream; every case has the same figures.
             for topic in TOPICS {

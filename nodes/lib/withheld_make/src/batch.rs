@@ -220,8 +220,8 @@ impl Batch {
         let (asked, effects) = loop {
             let asked = names
                 .iter()
-                .map(|name| draw::sized(name, drive.wheelbase_m < 1.0, 0.0, random))
-                .collect::<Result<Vec<_>, _>>()?;
+                .map(|name| Ok(drive.unseen(draw::sized(name, drive.wheelbase_m < 1.0, 0.0, random)?)))
+                .collect::<Result<Vec<_>, WithheldError>>()?;
             let effects = asked.iter().map(measured::effect).collect::<Result<Vec<_>, _>>()?;
             if effects.iter().all(|e| drive.takes(e)) {
                 break (asked, effects);

@@ -149,7 +149,7 @@ impl Labels {
     /// # Errors
     /// [`WithheldError::Io`].
     pub fn seal(&self, file: &Path, cases: &Path) -> Result<String, WithheldError> {
-        let text = serde_json::to_string_pretty(self).map_err(|e| WithheldError::content(file, &e))? + "\n";
+        let text = serde_json::to_string(self).map_err(|e| WithheldError::content(file, &e))? + "\n";
         fs::write(file, &text).map_err(WithheldError::io(file))?;
         let hash = sha256_hex(text.as_bytes());
         let commitment = cases.join(COMMITMENT);

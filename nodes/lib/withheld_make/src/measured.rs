@@ -131,6 +131,27 @@ impl MeasuredDrive {
         self.measurements.iter().any(|m| m.stream() == role)
     }
 
+    /// A setting whose effect leaves no trace in the stamps: a delay of the command is made a multiple of its period, so that the
+    /// stamps of command and odometry lie to each other as they did.
+    pub(crate) fn unseen(&self, mut setting: EffectSetting) -> EffectSetting {
+        let period_s = self.command_period_s();
+        if setting.name == "steering_delay" && period_s > 0.0 {
+            for delay_s in setting.parameters.values_mut() {
+                *delay_s = (*delay_s / period_s).round().max(1.0) * period_s;
+            }
+        }
+        setting
+    }
+
+    /// Middle one of the steps between drive commands.
+    fn command_period_s(&self) -> f64 {
+        let commands = self.measurements.iter().filter(|m| matches!(m, Measurement::Drive(_)));
+        let stamps: Vec<i64> = commands.map(Measurement::stamp_ns).collect();
+        let mut steps: Vec<i64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        steps.sort_unstable();
+        steps.get(steps.len() / 2).map_or(0.0, |step| *step as f64 / gripsight_signals::NS_PER_S)
+    }
+
     /// Two stretches of the drive that do not overlap, with effects put in.
     pub(crate) fn stretches(
         &self,
