@@ -6,7 +6,7 @@ use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 use crate::budget::{Budget, Models};
 use crate::effects::{EffectId, Need};
 use crate::engine::{Engine, State, TireTrust};
-use crate::outcome::{DetectionLimit, Diagnosis, Invisible, TirePair};
+use crate::outcome::{DetectionLimit, Diagnosis, Invisible, TirePair, Verdict};
 use crate::recording::Recording;
 use crate::search::{Found, search};
 use crate::select::reweigh;
@@ -102,7 +102,14 @@ fn explain(
     let (verdict, mut reasons) = decide(&budget, &last, &state, &costs);
     reasons.extend(crate::noise::caveat(&recording));
     let blocks = &windows.training.block;
-    let effects = rank(&evidence, &last, &state, &budget, blocks, costs.last().copied().unwrap_or(f64::NAN));
+    let left = costs.last().copied().unwrap_or(f64::NAN);
+    let mut effects = rank(&evidence, &last, &state, &budget, blocks, left);
+    if verdict != Verdict::Effects {
+        // Found, but not enough to be named.
+        for e in &mut effects {
+            (e.accepted, e.confidence) = (false, 0.0);
+        }
+    }
     let scored_windows =
         if windows.held_out.windows.is_empty() { &windows.training } else { &windows.held_out };
     let on_all = split(&recording, false).training;

@@ -55,7 +55,9 @@ pub(crate) fn screen(
     let here = engine.linearize(&quiet, &effects, &values, &state.starts, windows);
     let free: Vec<usize> = (0..values.len()).filter(|&j| parameters[j].free).collect();
     let row_of = |j: usize| free.iter().position(|&f| f == j);
-    let own: Vec<usize> = (0..state.parameters.len()).filter_map(row_of).collect();
+    // What is on its bound does not move along.
+    let bound = |j: &usize| state.fit.as_ref().is_some_and(|f| f.on_bound.contains(j));
+    let own: Vec<usize> = (0..state.parameters.len()).filter(|j| !bound(j)).filter_map(row_of).collect();
     let place = |effect: EffectId| {
         let before: usize =
             effects.iter().take_while(|e| **e != effect).map(|e| e.spec().parameters.len()).sum();

@@ -42,6 +42,8 @@ pub(crate) mod thresholds {
     pub(crate) const CONFUSED_Z: f64 = 1.64;
     /// Candidates whose signatures are this parallel are confused.
     pub(crate) const CONFUSED_COSINE: f64 = 0.97;
+    /// A candidate that gains less than this share of the best one's gain is no rival, however unsure the difference.
+    pub(crate) const RIVAL_SHARE: f64 = 0.5;
     /// A candidate this near to the best one's cost, in shares of the best one's gain, counts as near.
     pub(crate) const NEAR_SHARE: f64 = 0.05;
 }
@@ -260,7 +262,8 @@ pub(crate) fn round(
     let mut order: Vec<&Screened> = screening.candidates.iter().collect();
     order.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let count = thresholds::REFITS[number.min(1)];
-    let top = order.first().map_or(0.0, |s| s.gain);
+    // A linear step may promise more than there is.
+    let top = order.first().map_or(0.0, |s| s.gain.min(state.cost));
     let worth = (thresholds::WORTH_OF_BEST * top).max(thresholds::WORTH_OF_COST * state.cost);
     let mut looks: Vec<State> = order
         .into_iter()

@@ -13,8 +13,8 @@ use crate::outcome::EffectParameter;
 const NINETY: f64 = 1.645;
 /// What the scatter between blocks misses: errors of the model that all blocks share. As a factor on the standard error, and as a share
 /// of the size. Fixed on development cases.
-const WIDER: f64 = 1.5;
-const SHARE: f64 = 0.03;
+const WIDER: f64 = 2.0;
+const SHARE: f64 = 0.115;
 
 /// Parameters of an effect as reported, with 90 % intervals.
 pub(crate) fn sizes(

@@ -14,6 +14,8 @@ const WORSE: f64 = 1.2;
 const LEAST_EXPLAINED: f64 = 0.65;
 /// Share of what is left that flexible terms explain from which something is missing in the model; less is scatter.
 const EXPLAINABLE: f64 = 0.2;
+/// Mean squared held-out error over noise that is more than the usual imperfection of the model.
+const LARGE_ERROR: f64 = 4.0;
 /// Weighted cost per residual that is too much for scatter.
 const HUGE_COST: f64 = 4.0;
 /// Excess of the nominal over the retuned model that makes it a retune.
@@ -33,7 +35,7 @@ pub(crate) fn decide(budget: &Budget, last: &Round, state: &State, costs: &[f64]
     let small = left < thresholds::SMALL_COST;
     let explainable = (after - ceiling) / (after - 1.0).max(1e-9);
     if state.named.is_empty() {
-        if small || (left < HUGE_COST && explainable < EXPLAINABLE) {
+        if (small && after < LARGE_ERROR) || (left < HUGE_COST && explainable < EXPLAINABLE) {
             let retune = nominal - retuned > RETUNE_EXCESS;
             reasons.push("what is left after retuning the tires is within noise and the usual imperfection of the model".to_owned());
             return (if retune { Verdict::TireRetuneOnly } else { Verdict::NoGap }, reasons);
@@ -53,7 +55,7 @@ pub(crate) fn decide(budget: &Budget, last: &Round, state: &State, costs: &[f64]
         100.0 * closed,
         100.0 * explainable
     ));
-    if !small && closed < LEAST_EXPLAINED && explainable > EXPLAINABLE {
+    if (!small || after > LARGE_ERROR) && closed < LEAST_EXPLAINED && explainable > EXPLAINABLE {
         reasons.push("that is too little: the cause is not, or not only, in the library".to_owned());
         return (Verdict::NoneOfThese, reasons);
     }
@@ -132,7 +134,8 @@ fn confused(round: &Round, effect: EffectId) -> Vec<EffectId> {
         .filter(|(r, z)| {
             let near = best.gain - r.gain < thresholds::NEAR_SHARE * best.gain;
             let alike = round.screening.cosine(effect, r.effect) > thresholds::CONFUSED_COSINE;
-            **z < thresholds::CONFUSED_Z || (near && alike)
+            let rival = r.gain > thresholds::RIVAL_SHARE * best.gain;
+            (rival && **z < thresholds::CONFUSED_Z) || (near && alike)
         })
         .map(|(r, _)| r.effect)
         .collect()
