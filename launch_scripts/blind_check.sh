@@ -17,7 +17,7 @@ if [ ! -e "$out/cases/commitment.txt" ]; then
     more=()
     if [ -n "${FOREIGN:-}" ]; then more+=(--foreign "$FOREIGN" --foreign-cases $((cases / 6))); fi
     if [ -n "${RECORDED:-}" ]; then more+=(--recorded "$RECORDED" --recorded-cases $((cases / 12))); fi
-    "$gripsight" withheld make --cases "$cases" --duration 20 "${more[@]}" --out "$out/cases" --labels "$out/labels.json"
+    "$gripsight" withheld make --cases "$cases" --duration 16 "${more[@]}" --out "$out/cases" --labels "$out/labels.json"
 fi
 "$gripsight" withheld diagnose "$out/cases" --out "$out/verdicts"
 "$gripsight" withheld score "$out/cases" "$out/verdicts" --labels "$out/labels.json" --out "$out/report"
