@@ -12,9 +12,10 @@ use std::ops::ControlFlow;
 
 use gripsight_s4::{Normalization, ResidualNetwork, Sequence, TrainingConfig, TrainingSet, train};
 use gripsight_signals::{DataHealth, Segment, StateSequence};
-use gripsight_vehicle::{Input, MagicFormula, PacejkaParameters, SingleTrack, State, VehicleParameters};
-use nalgebra::{Const, Matrix4, Vector4};
-use num_dual::DualSVec;
+use gripsight_vehicle::{
+    Dual, Input, MagicFormula, PacejkaParameters, Real, SingleTrack, State, VehicleParameters,
+};
+use nalgebra::{Matrix4, Vector4};
 
 use crate::data::{Data, MIN_WINDOWS, Part, quantile};
 use crate::rollout::{delayed, substep_s};
@@ -256,9 +257,10 @@ fn disturbances(
     (stretches, dt_s, (2 * half).div_ceil(stride))
 }
 
-type Dual = DualSVec<f64, 4>;
+/// Derivatives by the start state and the disturbance.
+type Dual4 = Dual<4>;
 
-fn lift(axle: &MagicFormula) -> MagicFormula<Dual> {
+fn lift(axle: &MagicFormula) -> MagicFormula<Dual4> {
     MagicFormula {
         b: Dual::from(axle.b),
         c: Dual::from(axle.c),
@@ -269,7 +271,7 @@ fn lift(axle: &MagicFormula) -> MagicFormula<Dual> {
 
 /// Finds the constant disturbance of a window.
 struct Disturbance {
-    car: SingleTrack<Dual>,
+    car: SingleTrack<Dual4>,
     noise: [f64; 2],
     stiffness: f64,
 }
@@ -279,10 +281,10 @@ impl Disturbance {
     fn solve(&self, series: &[(State, Input)], dt_s: f64) -> Option<(State, [f64; 2])> {
         let (first, _) = series.first()?;
         let mut x = State {
-            v_y_mps: Dual::from(first.v_y_mps).derivative(0),
-            yaw_rate_radps: Dual::from(first.yaw_rate_radps).derivative(1),
+            v_y_mps: Dual::variable(first.v_y_mps, 0),
+            yaw_rate_radps: Dual::variable(first.yaw_rate_radps, 1),
         };
-        let rate = [Dual::from(0.0).derivative(2), Dual::from(0.0).derivative(3)];
+        let rate = [Dual4::variable(0.0, 2), Dual4::variable(0.0, 3)];
         let (mut information, mut gradient) = (Matrix4::zeros(), Vector4::zeros());
         let mut middle = x;
         for (k, (measured, input)) in series.iter().enumerate() {
@@ -295,7 +297,7 @@ impl Disturbance {
             ] {
                 let slope = slope_of(value) / noise;
                 information += slope * slope.transpose();
-                gradient += slope * ((target - value.re) / noise);
+                gradient += slope * ((target - value.re()) / noise);
             }
             if let Some((_, next)) = series.get(k + 1) {
                 let step_s = substep_s(self.stiffness, input.v_x_mps);
@@ -305,17 +307,17 @@ impl Disturbance {
             }
         }
         let step = information.cholesky()?.solve(&gradient);
-        let moved = |value: Dual| value.re + slope_of(value).dot(&step);
+        let moved = |value: Dual4| value.re() + slope_of(value).dot(&step);
         let state = State { v_y_mps: moved(middle.v_y_mps), yaw_rate_radps: moved(middle.yaw_rate_radps) };
         let finite = step.iter().all(|v| v.is_finite());
         finite.then_some((state, [step[2], step[3]]))
     }
 }
 
-fn slope_of(value: Dual) -> Vector4<f64> {
-    value.eps.unwrap_generic(Const, Const)
+fn slope_of(value: Dual4) -> Vector4<f64> {
+    Vector4::from(*value.derivatives())
 }
 
-fn lift_input(input: &Input) -> Input<Dual> {
+fn lift_input(input: &Input) -> Input<Dual4> {
     Input { v_x_mps: Dual::from(input.v_x_mps), steering_rad: Dual::from(input.steering_rad) }
 }

@@ -74,7 +74,8 @@ pub(crate) struct TireRollout<'a> {
 /// Input and load transfer at a sample.
 #[derive(Debug, Clone, Copy)]
 struct Drive<T> {
-    input: Input<T>,
+    v_x_mps: f64,
+    steering_rad: T,
     /// Share of the front and of the rear static load that is on the axle.
     load: [f64; 2],
     /// Longitudinal over vertical force of either axle.
@@ -104,9 +105,15 @@ impl Visit {
 
 /// F_y/F_z at a slip beside a longitudinal force.
 fn left_beside<T: Real>(tire: &MagicFormula<T>, combined: T, slip: T, pull: f64) -> T {
-    let used = combined * pull / tire.d;
-    let left = -(used * used) + 1.0;
-    let left = if left.re() > LEAST_LEFT { left.sqrt() } else { T::from(LEAST_LEFT.sqrt()) };
+    let d = tire.d.re();
+    let used = combined.re() * pull / d;
+    let left = 1.0 - used * used;
+    let left = if left > LEAST_LEFT {
+        let left = left.sqrt();
+        T::chain(left, [(-used * pull / (d * left), &combined), (used * used / (d * left), &tire.d)])
+    } else {
+        T::from(LEAST_LEFT.sqrt())
+    };
     tire.normalized_force(slip) * left
 }
 
@@ -143,7 +150,7 @@ impl<'a> TireRollout<'a> {
             let front =
                 if force_n > 0.0 { self.vehicle.drive_front_share } else { self.vehicle.brake_front_share };
             let pull = [front * force_n / (front_n * load[0]), (1.0 - front) * force_n / (rear_n * load[1])];
-            Drive { input: Input { v_x_mps: T::from(segment.v_x_mps[k]), steering_rad }, load, pull }
+            Drive { v_x_mps: segment.v_x_mps[k], steering_rad, load, pull }
         };
         let end = window.from + window.len;
         let slowest = segment.v_x_mps[window.from..end].iter().copied().fold(f64::INFINITY, f64::min);
@@ -152,21 +159,21 @@ impl<'a> TireRollout<'a> {
         let h_s = segment.dt_s / substeps as f64;
         let mut x = State { v_y_mps: start[0], yaw_rate_radps: start[1] };
         let mut here = drive(window.from);
-        let mut slip = car.slip_angles_rad(&x, &here.input);
+        let mut slip = car.slip_angles_rad(&x, &here.input());
         // The steering part of the front slip lags from the start.
         let lag_samples = p[RELAXATION] / (segment.v_x_mps[window.from].max(1.0) * segment.dt_s);
         let before = delayed(&segment.steering_rad, window.from, delay_samples + lag_samples)
             * p[SIGNALS + 1]
             + p[SIGNALS + 2];
-        slip.0 += before - here.input.steering_rad;
+        slip.0 += before - here.steering_rad;
         for k in window.from..end {
-            visit(&Visit { state: x, input: here.input, slip_rad: slip, pull: here.pull });
+            visit(&Visit { state: x, input: here.input(), slip_rad: slip, pull: here.pull });
             if k + 1 == end {
                 break;
             }
             let next = drive(k + 1);
             // Shares of the way that the lagging slip goes in half a substep and in a whole one.
-            let half = T::one() - (-(T::from(0.5 * h_s * segment.v_x_mps[k]) / p[RELAXATION])).exp();
+            let half = -(-(p[RELAXATION].recip() * (0.5 * h_s * segment.v_x_mps[k]))).exp() + 1.0;
             let whole = half * (-half + 2.0);
             for i in 0..substeps {
                 // The midpoint rule, inputs linear over the sample.
@@ -174,9 +181,9 @@ impl<'a> TireRollout<'a> {
                 let slope = self.derivative(&car, p[COMBINED], &x, &at, slip);
                 let middle = moved(&x, &slope, 0.5 * h_s);
                 let at = here.towards(&next, (i as f64 + 0.5) / substeps as f64);
-                let target = car.slip_angles_rad(&middle, &at.input);
+                let target = car.slip_angles_rad(&middle, &at.input());
                 let follow =
-                    |share: T| (slip.0 + (target.0 - slip.0) * share, slip.1 + (target.1 - slip.1) * share);
+                    |share: T| (between(&slip.0, &target.0, share), between(&slip.1, &target.1, share));
                 let slope = self.derivative(&car, p[COMBINED], &middle, &at, follow(half));
                 slip = follow(whole);
                 x = moved(&x, &slope, h_s);
@@ -193,37 +200,69 @@ impl<'a> TireRollout<'a> {
         drive: &Drive<T>,
         slip: (T, T),
     ) -> State<T> {
-        let (v, input) = (self.vehicle, &drive.input);
-        let front_n = left_beside(&car.front, combined, slip.0, drive.pull[0])
-            * (v.static_load_front_n() * drive.load[0])
-            * input.steering_rad.cos();
-        let rear_n = left_beside(&car.rear, combined, slip.1, drive.pull[1])
-            * (v.static_load_rear_n() * drive.load[1]);
+        let v = self.vehicle;
+        let front = left_beside(&car.front, combined, slip.0, drive.pull[0]);
+        let rear = left_beside(&car.rear, combined, slip.1, drive.pull[1]);
+        let loads_n = [v.static_load_front_n() * drive.load[0], v.static_load_rear_n() * drive.load[1]];
+        let (sin, cos) = drive.steering_rad.re().sin_cos();
+        let across_n = front.re() * loads_n[0];
+        let (front_n, rear_n) = (across_n * cos, rear.re() * loads_n[1]);
+        // The same line for v_y and yaw rate: what a newton at the front and one at the rear do.
+        let rate = |value: f64, by_front: f64, by_rear: f64, by_yaw_rate: f64| {
+            T::chain(
+                value,
+                [
+                    (by_front * loads_n[0] * cos, &front),
+                    (-by_front * across_n * sin, &drive.steering_rad),
+                    (by_rear * loads_n[1], &rear),
+                    (by_yaw_rate, &x.yaw_rate_radps),
+                ],
+            )
+        };
+        let (mass_kg, inertia_kgm2) = (v.mass_kg, v.yaw_inertia_kgm2);
         State {
-            v_y_mps: (rear_n + front_n) / v.mass_kg - input.v_x_mps * x.yaw_rate_radps,
-            yaw_rate_radps: (front_n * v.l_f_m - rear_n * v.l_r_m) / v.yaw_inertia_kgm2,
+            v_y_mps: rate(
+                (rear_n + front_n) / mass_kg - drive.v_x_mps * x.yaw_rate_radps.re(),
+                1.0 / mass_kg,
+                1.0 / mass_kg,
+                -drive.v_x_mps,
+            ),
+            yaw_rate_radps: rate(
+                (front_n * v.l_f_m - rear_n * v.l_r_m) / inertia_kgm2,
+                v.l_f_m / inertia_kgm2,
+                -v.l_r_m / inertia_kgm2,
+                0.0,
+            ),
         }
     }
 }
 
 impl<T: Real> Drive<T> {
+    fn input(&self) -> Input<T> {
+        Input { v_x_mps: T::from(self.v_x_mps), steering_rad: self.steering_rad }
+    }
+
     fn towards(&self, next: &Self, share: f64) -> Self {
         Self {
-            input: Input {
-                v_x_mps: self.input.v_x_mps + (next.input.v_x_mps - self.input.v_x_mps) * share,
-                steering_rad: self.input.steering_rad
-                    + (next.input.steering_rad - self.input.steering_rad) * share,
-            },
+            v_x_mps: self.v_x_mps + (next.v_x_mps - self.v_x_mps) * share,
+            steering_rad: between(&self.steering_rad, &next.steering_rad, T::from(share)),
             load: std::array::from_fn(|i| self.load[i] + (next.load[i] - self.load[i]) * share),
             pull: std::array::from_fn(|i| self.pull[i] + (next.pull[i] - self.pull[i]) * share),
         }
     }
 }
 
+/// A share of the way from one to the other.
+fn between<T: Real>(from: &T, to: &T, share: T) -> T {
+    let (way, part) = (to.re() - from.re(), share.re());
+    T::chain(from.re() + way * part, [(1.0 - part, from), (part, to), (way, &share)])
+}
+
 fn moved<T: Real>(x: &State<T>, slope: &State<T>, h_s: f64) -> State<T> {
+    let along = |x: &T, slope: &T| T::chain(x.re() + slope.re() * h_s, [(1.0, x), (h_s, slope)]);
     State {
-        v_y_mps: x.v_y_mps + slope.v_y_mps * h_s,
-        yaw_rate_radps: x.yaw_rate_radps + slope.yaw_rate_radps * h_s,
+        v_y_mps: along(&x.v_y_mps, &slope.v_y_mps),
+        yaw_rate_radps: along(&x.yaw_rate_radps, &slope.yaw_rate_radps),
     }
 }
 

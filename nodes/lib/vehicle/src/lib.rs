@@ -13,17 +13,14 @@ mod error;
 pub mod handling;
 mod magic_formula;
 mod parameters;
+mod real;
 mod single_track;
 
 pub use error::VehicleError;
 pub use magic_formula::{MagicFormula, PacejkaParameters};
 pub use parameters::VehicleParameters;
+pub use real::{Dual, Real};
 pub use single_track::{Input, SingleTrack, State};
 
 /// Standard gravity.
 pub const GRAVITY_MPS2: f64 = 9.806_65;
-
-/// A number that the model can be evaluated with: `f64`, or a dual number carrying derivatives.
-pub trait Real: num_dual::DualNum<Primitive = f64> + Copy {}
-
-impl<T: num_dual::DualNum<Primitive = f64> + Copy> Real for T {}

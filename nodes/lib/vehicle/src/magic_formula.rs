@@ -25,8 +25,25 @@ impl<T: Real> MagicFormula<T> {
     /// F_y/F_z at a slip angle. Odd, and bounded by D.
     #[must_use]
     pub fn normalized_force(&self, slip_angle_rad: T) -> T {
-        let ba = self.b * slip_angle_rad;
-        self.d * (self.c * (ba - self.e * (ba - ba.atan())).atan()).sin()
+        let (b, c, d, e, a) = (self.b.re(), self.c.re(), self.d.re(), self.e.re(), slip_angle_rad.re());
+        let ba = b * a;
+        let bend = ba - ba.atan();
+        let z = ba - e * bend;
+        let u = z.atan();
+        let (sin, cos) = (c * u).sin_cos();
+        // By z, and by B a.
+        let by_z = d * c * cos / (1.0 + z * z);
+        let by_ba = by_z * (1.0 - e + e / (1.0 + ba * ba));
+        T::chain(
+            d * sin,
+            [
+                (by_ba * b, &slip_angle_rad),
+                (by_ba * a, &self.b),
+                (d * u * cos, &self.c),
+                (sin, &self.d),
+                (-by_z * bend, &self.e),
+            ],
+        )
     }
 
     /// Slope at zero slip, B C D, 1/rad: times the load it is the cornering stiffness.
@@ -114,7 +131,7 @@ impl PacejkaParameters {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use num_dual::DualSVec;
+    use crate::Dual;
     use proptest::prelude::*;
 
     fn tires() -> impl Strategy<Value = MagicFormula> {
@@ -131,11 +148,28 @@ mod tests {
 
         #[test]
         fn slope_at_zero_is_bcd(tire in tires()) {
-            let a: DualSVec<f64, 1> = DualSVec::from_re(0.0).derivative(0);
-            let lift = |v: f64| DualSVec::<f64, 1>::from_re(v);
+            let lift = |v: f64| Dual::<1>::from(v);
             let dual = MagicFormula { b: lift(tire.b), c: lift(tire.c), d: lift(tire.d), e: lift(tire.e) };
-            let slope = dual.normalized_force(a).eps.unwrap_generic(nalgebra::U1, nalgebra::U1)[0];
+            let slope = dual.normalized_force(Dual::variable(0.0, 0)).derivatives()[0];
             approx::assert_relative_eq!(slope, tire.normalized_stiffness(), max_relative = 1e-12);
+        }
+
+        #[test]
+        fn derivatives_are_those_of_the_curve(tire in tires(), a in -1.5..1.5) {
+            let lane = |lane: usize, v: f64| Dual::<5>::variable(v, lane);
+            let dual = MagicFormula { b: lane(0, tire.b), c: lane(1, tire.c), d: lane(2, tire.d), e: lane(3, tire.e) };
+            let exact = *dual.normalized_force(lane(4, a)).derivatives();
+            let at = [tire.b, tire.c, tire.d, tire.e, a];
+            for lane in 0..5 {
+                let h = 1e-6 * at[lane].abs().max(0.1);
+                let force = |by: f64| {
+                    let mut v = at;
+                    v[lane] += by;
+                    MagicFormula { b: v[0], c: v[1], d: v[2], e: v[3] }.normalized_force(v[4])
+                };
+                let difference = (force(h) - force(-h)) / (2.0 * h);
+                approx::assert_relative_eq!(exact[lane], difference, epsilon = 1e-5, max_relative = 1e-4);
+            }
         }
 
         #[test]

@@ -73,9 +73,25 @@ impl<T: Real> SingleTrack<T> {
 
     /// Slip angles of the front and the rear axle.
     pub fn slip_angles_rad(&self, state: &State<T>, input: &Input<T>) -> (T, T) {
-        let v_x = if input.v_x_mps.re() < MIN_SPEED_MPS { T::from(MIN_SPEED_MPS) } else { input.v_x_mps };
-        let front = input.steering_rad - ((state.v_y_mps + state.yaw_rate_radps * self.l_f_m) / v_x).atan();
-        let rear = -((state.v_y_mps - state.yaw_rate_radps * self.l_r_m) / v_x).atan();
+        let (v_x_mps, follows) = match input.v_x_mps.re() {
+            slow if slow < MIN_SPEED_MPS => (MIN_SPEED_MPS, 0.0),
+            v_x_mps => (v_x_mps, 1.0),
+        };
+        // The angle of the velocity of a point ahead of the centre of gravity.
+        let angle = |ahead_m: f64| {
+            let slope = (state.v_y_mps.re() + ahead_m * state.yaw_rate_radps.re()) / v_x_mps;
+            let by_slope = 1.0 / (1.0 + slope * slope);
+            let by_v_y = by_slope / v_x_mps;
+            T::chain(
+                slope.atan(),
+                [
+                    (by_v_y, &state.v_y_mps),
+                    (by_v_y * ahead_m, &state.yaw_rate_radps),
+                    (-by_v_y * slope * follows, &input.v_x_mps),
+                ],
+            )
+        };
+        let (front, rear) = (input.steering_rad - angle(self.l_f_m), -angle(-self.l_r_m));
         (front, rear)
     }
 

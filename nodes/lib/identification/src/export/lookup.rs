@@ -20,8 +20,7 @@
 
 use std::fmt::Write as _;
 
-use gripsight_vehicle::{GRAVITY_MPS2, MagicFormula, PacejkaParameters, VehicleParameters};
-use num_dual::{Dual64, DualNum};
+use gripsight_vehicle::{Dual, GRAVITY_MPS2, MagicFormula, PacejkaParameters, Real, VehicleParameters};
 
 /// Number of speeds.
 const SPEEDS: usize = 65;
@@ -110,7 +109,7 @@ fn column(wheelbase_m: f64, tires: &PacejkaParameters, v_mps: f64, steering_rad:
         let walked = (1..=steps as usize)
             .try_fold(slip_rad, |slip, n| turn.solve(from + (to - from) * n as f64 / steps, slip));
         let Some(next) = walked else { break };
-        let a_mps2 = GRAVITY_MPS2 * turn.rear.normalized_force(next.1.into()).re;
+        let a_mps2 = GRAVITY_MPS2 * turn.rear.normalized_force(next.1.into()).re();
         if a_mps2 <= accelerations[k - 1] {
             break;
         }
@@ -120,14 +119,17 @@ fn column(wheelbase_m: f64, tires: &PacejkaParameters, v_mps: f64, steering_rad:
     accelerations
 }
 
-fn lift(tire: &MagicFormula) -> MagicFormula<Dual64> {
+/// Derivatives by the front and the rear slip angle.
+type Slips = Dual<2>;
+
+fn lift(tire: &MagicFormula) -> MagicFormula<Slips> {
     MagicFormula { b: tire.b.into(), c: tire.c.into(), d: tire.d.into(), e: tire.e.into() }
 }
 
 /// The two equations of a steady turn at one speed.
 struct Turn {
-    front: MagicFormula<Dual64>,
-    rear: MagicFormula<Dual64>,
+    front: MagicFormula<Slips>,
+    rear: MagicFormula<Slips>,
     /// L g/v_x^2.
     curvature: f64,
 }
@@ -139,17 +141,14 @@ impl Turn {
         const TOLERANCE: f64 = 1e-11;
         let (mut front_rad, mut rear_rad) = guess_rad;
         for _ in 0..ITERATIONS {
-            let n_f = self.front.normalized_force(Dual64::from(front_rad).derivative());
-            let n_r = self.rear.normalized_force(Dual64::from(rear_rad).derivative());
-            let towards = Dual64::new(steering_rad - front_rad, -1.0).tan();
-            let from = Dual64::from(rear_rad).derivative().tan();
-            let forces = n_f.re * steering_rad.cos() - n_r.re;
-            let directions = towards.re + from.re - self.curvature * n_r.re;
-            // Row by row: d(forces), d(directions) by front and rear slip.
-            let (a, b) = (n_f.eps * steering_rad.cos(), -n_r.eps);
-            let (c, d) = (towards.eps, from.eps - self.curvature * n_r.eps);
+            let (front, rear) = (Slips::variable(front_rad, 0), Slips::variable(rear_rad, 1));
+            let (n_f, n_r) = (self.front.normalized_force(front), self.rear.normalized_force(rear));
+            let forces = n_f * steering_rad.cos() - n_r;
+            let directions = (-front + steering_rad).tan() + rear.tan() - n_r * self.curvature;
+            let ([a, b], [c, d]) = (*forces.derivatives(), *directions.derivatives());
+            let (forces, directions) = (forces.re(), directions.re());
             let determinant = a * d - b * c;
-            let below_the_peak = n_f.eps > 0.0 && n_r.eps > 0.0;
+            let below_the_peak = n_f.derivatives()[0] > 0.0 && n_r.derivatives()[1] > 0.0;
             if !(below_the_peak && determinant < 0.0) {
                 return None;
             }

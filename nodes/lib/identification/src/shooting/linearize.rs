@@ -1,8 +1,7 @@
 //! One look at every window: cost, gradient, and the information matrix with the start states eliminated.
 
-use gripsight_vehicle::Real;
-use nalgebra::{Const, DMatrix, DVector, Matrix2, Matrix2xX, ToTypenum, Vector2};
-use num_dual::DualSVec;
+use gripsight_vehicle::{Dual, Real};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix2xX, Vector2};
 use rayon::prelude::*;
 
 use super::{Problem, Rollout, Window};
@@ -62,7 +61,8 @@ pub fn linearize<M: Rollout>(
                 5..=8 => part::<M, 8>(problem, &free, parameters, *start, window),
                 9..=12 => part::<M, 12>(problem, &free, parameters, *start, window),
                 13..=16 => part::<M, 16>(problem, &free, parameters, *start, window),
-                17..=24 => part::<M, 24>(problem, &free, parameters, *start, window),
+                17..=20 => part::<M, 20>(problem, &free, parameters, *start, window),
+                21..=24 => part::<M, 24>(problem, &free, parameters, *start, window),
                 25..=32 => part::<M, 32>(problem, &free, parameters, *start, window),
                 33..=48 => part::<M, 48>(problem, &free, parameters, *start, window),
                 _ => part::<M, 80>(problem, &free, parameters, *start, window),
@@ -158,16 +158,13 @@ fn part<M: Rollout, const N: usize>(
     parameters: &[f64],
     start: [f64; 2],
     window: &Window,
-) -> WindowPart
-where
-    Const<N>: ToTypenum,
-{
+) -> WindowPart {
     let p = free.len();
-    let mut theta: Vec<DualSVec<f64, N>> = parameters.iter().map(|&v| DualSVec::from(v)).collect();
+    let mut theta: Vec<Dual<N>> = parameters.iter().map(|&v| Dual::from(v)).collect();
     for (lane, &j) in free.iter().enumerate() {
-        theta[j] = theta[j].derivative(lane);
+        theta[j] = Dual::variable(parameters[j], lane);
     }
-    let start = [DualSVec::from(start[0]).derivative(p), DualSVec::from(start[1]).derivative(p + 1)];
+    let start = [Dual::variable(start[0], p), Dual::variable(start[1], p + 1)];
     let (mut predicted, mut measured) = (Vec::new(), Vec::new());
     problem.model.rollout(&theta, start, window, &mut predicted);
     problem.model.measured(window, &mut measured);
@@ -175,29 +172,24 @@ where
     let mut square = 0.0;
     let mut n = 0;
     // J^T J and J^T r over all lanes, the two start states last; J = d(residual) = -d(predicted)/sigma.
-    let mut jtj = DMatrix::<f64>::zeros(p + 2, p + 2);
-    let mut jtr = DVector::<f64>::zeros(p + 2);
+    let mut lower = [[0.0; N]; N];
+    let mut product = [0.0; N];
     let channels = problem.sigma.len();
     for (i, r) in residuals(problem, &measured, &predicted) {
         square += r * r;
         n += 1;
-        let Some(eps) = predicted[i].eps.0.as_ref() else { continue };
         let scale = -1.0 / problem.sigma[i % channels];
-        for a in 0..p + 2 {
-            let ja = eps[a] * scale;
-            if ja == 0.0 {
-                continue;
-            }
-            jtr[a] += ja * r;
-            for b in a..p + 2 {
-                jtj[(b, a)] += ja * eps[b] * scale;
+        let jacobian = predicted[i].derivatives().map(|d| d * scale);
+        for (a, &ja) in jacobian.iter().enumerate().take(p + 2).filter(|(_, ja)| **ja != 0.0) {
+            product[a] += ja * r;
+            for (sum, jb) in lower[a].iter_mut().zip(&jacobian[..=a]) {
+                *sum += ja * jb;
             }
         }
     }
     let (cost, weight) = loss(square, n, problem.robust_k);
-    jtj.fill_upper_triangle_with_lower_triangle();
-    jtj *= weight;
-    jtr *= weight;
+    let jtj = DMatrix::from_fn(p + 2, p + 2, |a, b| weight * lower[a.max(b)][a.min(b)]);
+    let jtr = DVector::from_fn(p + 2, |a, _| weight * product[a]);
 
     let start_block = Matrix2::new(jtj[(p, p)], jtj[(p, p + 1)], jtj[(p + 1, p)], jtj[(p + 1, p + 1)]);
     // A start that the outputs do not show stays where it is.
