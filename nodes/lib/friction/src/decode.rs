@@ -115,11 +115,14 @@ fn decode_compressed(bytes: &[u8], region: &Region) -> Result<RgbPicture, Fricti
     let (width, height) = decoder.dimensions();
     check_size(width, height)?;
     let whole = image::DynamicImage::from_decoder(decoder).map_err(|e| undecodable(e.to_string()))?;
-    let rgb = whole.into_rgb8();
+    let rgb = whole.into_rgb8().into_raw();
     let (x, y, w, h) = region.pixels(width, height);
-    let stride = width as usize * 3;
-    let (from, to) = (x as usize * 3, (x + w) as usize * 3);
-    let rows = rgb.as_raw().chunks_exact(stride).skip(y as usize).take(h as usize);
-    let data = rows.flat_map(|row| &row[from..to]).copied().collect();
+    if (w, h) == (width, height) {
+        return Ok(RgbPicture { width, height, data: rgb });
+    }
+    let mut data = Vec::with_capacity((w * h * 3) as usize);
+    for row in rgb.chunks_exact(width as usize * 3).skip(y as usize).take(h as usize) {
+        data.extend_from_slice(&row[x as usize * 3..(x + w) as usize * 3]);
+    }
     Ok(RgbPicture { width: w, height: h, data })
 }
