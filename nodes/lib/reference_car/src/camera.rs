@@ -2,8 +2,8 @@
 //!
 //! A plane of seeded value noise, seen in perspective and moving with the car, is coloured as a dry, wet, flooded, snowy or icy
 //! road. The recipe is that of the made textures in `nodes/camera_prior/training` (binder, stones and mottle; a darker film
-//! with sheen; a mirror; lit relief; a milky pane with cracks), written again: no code or random field is shared. Black ice,
-//! which looks like a wet road, is not drawn.
+//! with sheen; a mirror; lit relief; a milky pane with cracks), written again: no code or random field is shared. Lens and
+//! pixels blur what falls on them before the sensor's noise is added. Black ice, which looks like a wet road, is not drawn.
 
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
@@ -111,7 +111,7 @@ impl RoadCamera {
             mirror: draw(0.3, 0.65),
             drowned: draw(0.15, 0.4),
             white: draw(0.65, 0.9),
-            relief: draw(0.08, 0.2),
+            relief: draw(0.03, 0.1),
             milk: draw(0.35, 0.6),
             noise: draw(0.5, 3.0),
         }
@@ -155,7 +155,7 @@ impl RoadCamera {
         } else {
             // Value noise is nearly normal: this is the level above which the share `covered` lies.
             let level = quantile(1.0 - covered);
-            let field = self.rough(7, x, y, size / 6.0);
+            let field = self.octaves(7, x, y, size / 6.0, 12.0, 1.0);
             (0.5 + (field - level) / 0.2).clamp(0.0, 1.0)
         };
         let above = if share < 1.0 { self.state(upper, x, y, size) } else { [0.0; 3] };
@@ -183,9 +183,10 @@ impl RoadCamera {
                 [1.0, 1.02, 1.06].map(|blue| self.drowned * dry(0.2) + self.mirror * ripple * sky * blue)
             }
             3 => {
+                // Light that wanders through snow evens out its relief: a contrast of a few percent is left.
                 let height = |x: f64, y: f64| self.rough(8, x, y, 24.0);
-                let slope = height(x + 1.0, y + 1.0) - height(x - 1.0, y - 1.0);
-                let lit = (1.0 + self.relief * 3.0 * slope).clamp(0.3, 1.4);
+                let slope = height(x + 1.5, y + 1.5) - height(x - 1.5, y - 1.5);
+                let lit = (1.0 + self.relief * slope).clamp(0.3, 1.4);
                 [0.97, 1.0, 1.03].map(|cool| self.white * lit * cool)
             }
             _ => {
@@ -200,15 +201,16 @@ impl RoadCamera {
         }
     }
 
-    /// Exposure, tone curve and sensor noise.
+    /// Lens, exposure, tone curve and sensor noise.
     fn develop(&self, side: u32, position_m: f64, light: &[[f64; 3]]) -> RoadPicture {
+        let light = through_the_lens(side as usize, light);
         let mean = light.iter().map(|c| c[1]).sum::<f64>() / light.len().max(1) as f64;
         // An automatic exposure evens scenes out, but not wholly.
         let gain = self.exposure * (mean / 0.2).powf(0.25) / mean.max(1e-3);
         let frame = (position_m * 1e3).round() as i64 as u64;
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed ^ frame.rotate_left(20));
         let mut data = Vec::with_capacity(light.len() * 3);
-        for colour in light {
+        for colour in &light {
             for c in colour {
                 let level = 255.0 * (c * gain).clamp(0.0, 1.0).powf(1.0 / 2.2);
                 // A triangular distribution of standard deviation `noise`.
@@ -221,18 +223,19 @@ impl RoadCamera {
 
     /// Octaves of equal strength from the wavelength `longest` (pixels) down to two pixels: a 1/f^2 field, unit variance.
     fn rough(&self, layer: u64, x: f64, y: f64, longest: f64) -> f64 {
-        self.octaves(layer, x, y, longest, 1.0)
+        self.octaves(layer, x, y, longest, 2.0, 1.0)
     }
 
     /// Octaves whose strength falls with their wavelength: a 1/f^3 field, unit variance.
     fn smooth(&self, layer: u64, x: f64, y: f64, longest: f64) -> f64 {
-        self.octaves(layer, x, y, longest, 0.5f64.sqrt())
+        self.octaves(layer, x, y, longest, 2.0, 0.5f64.sqrt())
     }
 
-    fn octaves(&self, layer: u64, x: f64, y: f64, longest: f64, fall: f64) -> f64 {
+    /// Octaves from the wavelength `longest` down to `shortest` (pixels), each `fall` times as strong as the one before.
+    fn octaves(&self, layer: u64, x: f64, y: f64, longest: f64, shortest: f64, fall: f64) -> f64 {
         let (mut wavelength, mut weight, mut sum, mut power) = (longest, 1.0, 0.0, 0.0);
         let mut octave = 0;
-        while wavelength >= 2.0 {
+        while wavelength >= shortest {
             // Wavelength is two lattice cells.
             let cell = wavelength / 2.0;
             sum += weight * value(self.seed ^ (layer << 32) ^ (octave << 40), x / cell, y / cell);
@@ -241,6 +244,21 @@ impl RoadCamera {
         }
         if power > 0.0 { sum / power.sqrt() } else { 0.0 }
     }
+}
+
+/// What lens and pixels pass on: each pixel the mean of its 3 x 3 neighbours with the weights 1 2 1 along rows and columns.
+fn through_the_lens(side: usize, light: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    let blur = |from: &[[f64; 3]], step: usize, along: fn(usize, usize) -> usize| -> Vec<[f64; 3]> {
+        let soft = |(i, centre): (usize, &[f64; 3])| {
+            let at = along(i, side);
+            let before = from[if at > 0 { i - step } else { i }];
+            let after = from[if at + 1 < side { i + step } else { i }];
+            [0, 1, 2].map(|k| 0.25 * (before[k] + 2.0 * centre[k] + after[k]))
+        };
+        from.iter().enumerate().map(soft).collect()
+    };
+    let rows = blur(light, 1, |i, side| i % side);
+    blur(&rows, side, |i, side| i / side)
 }
 
 /// Value noise: random numbers at whole coordinates, smooth in between; about unit variance.
@@ -284,6 +302,15 @@ mod tests {
         assert_ne!(here, camera.picture(64, 1.1, 0.85));
         assert_ne!(here, RoadCamera::new(5).picture(64, 1.0, 0.85));
         assert_eq!(here.data.len(), 64 * 64 * 3);
+    }
+
+    #[test]
+    fn the_lens_spreads_a_point_and_loses_no_light() {
+        let mut light = vec![[0.0; 3]; 49];
+        light[24] = [16.0, 8.0, 0.0];
+        let got = through_the_lens(7, &light);
+        assert_eq!((got[24], got[23], got[16]), ([4.0, 2.0, 0.0], [2.0, 1.0, 0.0], [1.0, 0.5, 0.0]));
+        assert_eq!(through_the_lens(7, &[[3.0; 3]; 49]), [[3.0; 3]; 49]);
     }
 
     #[test]
