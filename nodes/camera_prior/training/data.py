@@ -15,7 +15,9 @@ from textures import OUTLIERS, ROADS, load_photographs
 MEAN = np.array([0.485, 0.456, 0.406], np.float32)
 STD = np.array([0.229, 0.224, 0.225], np.float32)
 BANK_SEEDS = {"train": 11, "val": 12, "test": 13}
-OUTLIER_SHARE, PROCEDURAL_SHARE = 0.12, 0.2
+OUTLIER_SHARE, PROCEDURAL_SHARE = 0.15, 0.2
+# Untouched photographs, in the order of ROADS: half of them concrete, which is what looks most like snow.
+PLAIN_SHARES = (0.2, 0.5, 0.1, 0.1, 0.05, 0.05)
 
 
 def to_tensor(picture):
@@ -24,23 +26,34 @@ def to_tensor(picture):
 
 
 def plain(rng, photo, size):
-    """A photograph as it is, for the class dry: most of it, resized as the node does, mirrored, a little brighter or darker."""
+    """A photograph as it is, for the class dry: most of it at the node's 224 pixels, mirrored, a little brighter or darker;
+    a smaller `size` is a window of that.
+    """
     h, w = photo.shape[:2]
     ch, cw = int(h * rng.uniform(0.7, 1.0)), int(w * rng.uniform(0.7, 1.0))
     y, x = rng.integers(h - ch + 1), rng.integers(w - cw + 1)
-    cut = Image.fromarray(photo[y:y + ch, x:x + cw]).resize((size, size), Image.BILINEAR)
-    out = np.asarray(cut, np.float32) * np.exp(rng.normal(0, 0.12)) * np.exp(rng.normal(0, 0.03, 3))
+    side = max(size, 224)
+    cut = Image.fromarray(photo[y:y + ch, x:x + cw]).resize((side, side), Image.BILINEAR)
+    y, x = rng.integers(side - size + 1, size=2)
+    out = np.asarray(cut, np.float32)[y:y + size, x:x + size] * np.exp(rng.normal(0, 0.15)) * np.exp(rng.normal(0, 0.03, 3))
     out = np.clip(out, 0, 255).astype(np.uint8)
     return out[:, ::-1] if rng.random() < 0.5 else out
+
+
+def finer(rng, bank, size, photo):
+    """A render by a camera of more pixels than the network takes, shrunk as the node shrinks it: most cameras are such."""
+    picture, f = render(rng, bank, int(size * rng.uniform(1.05, 1.7)), photo)
+    return np.asarray(Image.fromarray(picture).resize((size, size), Image.BILINEAR)), f
 
 
 class Renders(Dataset):
     """Picture `i` of a split, made from (seed, i) alone. Items: (tensor, target (5,), kind) with kind 1 for outliers."""
 
     def __init__(self, root, split, size, count, seed, outliers=True, procedural_share=PROCEDURAL_SHARE, first=0,
-                 plain_share=0.0):
+                 plain_share=0.0, finer_share=0.0):
         self.size, self.count, self.seed, self.first = size, count, seed, first
         self.outliers, self.procedural_share, self.plain_share = outliers, procedural_share, plain_share
+        self.finer_share = finer_share
         self.photographs = load_photographs(root, split, (*ROADS, *OUTLIERS))
         self.bank = Bank(BANK_SEEDS[split])
         self.folders, self.shares = list(ROADS), np.array(list(ROADS.values()))
@@ -52,11 +65,14 @@ class Renders(Dataset):
         """(RGB uint8, target, kind, material) of picture `i`."""
         rng = np.random.default_rng((self.seed, self.first + i))
         made = rng.random() < self.procedural_share
-        folder = "procedural" if made else self.folders[rng.choice(len(self.folders), p=self.shares)]
+        untouched = not made and self.plain_share and rng.random() < self.plain_share
+        shares = PLAIN_SHARES if untouched else self.shares
+        folder = "procedural" if made else self.folders[rng.choice(len(self.folders), p=shares)]
         photo = None if made else self.photographs[folder][rng.integers(len(self.photographs[folder]))]
-        if photo is not None and self.plain_share and rng.random() < self.plain_share:
+        if untouched:
             return plain(rng, photo, self.size), np.eye(5, dtype=np.float32)[0], 0, folder
-        road, f = render(rng, self.bank, self.size, photo)
+        shrunk = self.finer_share and rng.random() < self.finer_share
+        road, f = (finer if shrunk else render)(rng, self.bank, self.size, photo)
         if self.outliers and rng.random() < OUTLIER_SHARE:
             families = list(degradations.SEEN)
             family = families[rng.integers(len(families))]

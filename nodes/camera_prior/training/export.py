@@ -1,6 +1,7 @@
 """Trained weights to ONNX, and the golden files that tie the Rust pipeline to this one.
 
     python export.py --weights OUT/last.pt --backbone mobilenet_v3_small --out ../model/road_mobilenet_v3_small.onnx
+    python export.py --weights A.pt B.pt --shares 0.2 0.8 ...                      the average of two
     python export.py ... --golden ../../lib/friction/tests/golden
 """
 
@@ -41,15 +42,24 @@ def golden(net, folder):
         "tensor": tensor.flatten()[at].tolist(), "logits": logits.tolist()}, indent=1) + "\n")
 
 
+def averaged(paths, shares):
+    """The weighted mean of state_dicts; whole numbers (BatchNorm's counters) are the last one's."""
+    if len(paths) != len(shares) or abs(sum(shares) - 1) > 1e-6:
+        raise ValueError(f"expected {len(paths)} shares that add up to 1, got {shares}")
+    states = [torch.load(p, map_location="cpu", weights_only=True) for p in paths]
+    return {k: sum(c * s[k] for c, s in zip(shares, states)) if v.is_floating_point() else v for k, v in states[-1].items()}
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--weights", required=True)
+    parser.add_argument("--weights", required=True, nargs="+", help="one file, or several of one lineage to be averaged")
+    parser.add_argument("--shares", type=float, nargs="+", default=[1.0], help="of the files in that average")
     parser.add_argument("--backbone", default="mobilenet_v3_small")
     parser.add_argument("--out", required=True)
     parser.add_argument("--golden", help="folder for the golden picture, tensor and logits")
     args = parser.parse_args()
     net = build(args.backbone)
-    net.load_state_dict(torch.load(args.weights, map_location="cpu", weights_only=True))
+    net.load_state_dict(averaged(args.weights, args.shares))
     net.eval()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

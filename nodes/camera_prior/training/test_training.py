@@ -9,7 +9,8 @@ from PIL import Image
 
 import degradations
 import train
-from data import Rscd, rscd_class
+from data import Rscd, finer, plain, rscd_class
+from export import averaged
 from model import BASIS, build, flops, load_weights
 from noise import Bank
 from render import CLASSES, NEIGHBOURS, area_maps, render, sample_fractions
@@ -63,6 +64,23 @@ def test_the_split_is_by_file_and_disjoint():
 
 def test_no_degradation_of_the_test_is_trained_on():
     assert not set(degradations.SEEN) & set(degradations.UNSEEN)
+
+
+@pytest.mark.parametrize("family", [*degradations.SEEN.values(), *degradations.UNSEEN.values()], ids=lambda f: f.__name__)
+def test_every_degradation_gives_a_picture_that_follows_from_its_seed(family):
+    road, _ = render(np.random.default_rng(5), BANK, 64)
+    photographs = {name: [road] for name in ("asphalt", "grass", "ground", "sett", "paving_stones")}
+    first, again = (family(np.random.default_rng(8), BANK, road, photographs) for _ in range(2))
+    assert first.shape == road.shape and first.dtype == np.uint8 and (first == again).all()
+    assert (first != road).any()
+
+
+def test_a_finer_camera_and_a_plain_photograph_come_in_the_network_s_size():
+    photo, _ = render(np.random.default_rng(5), BANK, 120)
+    for size in (64, 224):
+        assert plain(np.random.default_rng(1), photo, size).shape == (size, size, 3)
+        picture, f = finer(np.random.default_rng(1), BANK, size, photo)
+        assert picture.shape == (size, size, 3) and abs(f.sum() - 1) < 1e-5
 
 
 @pytest.fixture
@@ -120,6 +138,15 @@ def test_weights_of_another_head_load_but_for_the_head(tmp_path):
     torch.save(torchvision.models.mobilenet_v3_small(num_classes=7).state_dict(), tmp_path / "w.pt")
     left = load_weights(build("mobilenet_v3_small"), tmp_path / "w.pt")
     assert left == ["classifier.3.bias", "classifier.3.weight"]
+
+
+def test_weights_are_averaged_by_their_shares(tmp_path):
+    for name, value in (("a", 1.0), ("b", 3.0)):
+        torch.save({"w": torch.tensor([value]), "count": torch.tensor(int(value))}, tmp_path / name)
+    mean = averaged([tmp_path / "a", tmp_path / "b"], [0.25, 0.75])
+    assert mean["w"].item() == 2.5 and mean["count"].item() == 3
+    with pytest.raises(ValueError, match="add up to 1"):
+        averaged([tmp_path / "a"], [0.5])
 
 
 def test_the_papers_counts_are_torchvisions_with_five_classes():

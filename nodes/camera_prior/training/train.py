@@ -84,7 +84,8 @@ def batches_of(args, stage, first):
         generator = torch.Generator().manual_seed(args.seed + first)
         sampler = WeightedRandomSampler(data.weights, steps * args.batch, generator=generator)
         return DataLoader(data, args.batch, sampler=sampler, num_workers=args.workers, drop_last=True)
-    data = Renders(args.photographs, "train", size, steps * args.batch, args.seed, first=first, plain_share=args.plain_share)
+    data = Renders(args.photographs, "train", size, steps * args.batch, args.seed, first=first, plain_share=args.plain_share,
+                   finer_share=args.finer_share)
     return DataLoader(data, args.batch, num_workers=args.workers, prefetch_factor=4 if args.workers else None)
 
 
@@ -108,6 +109,7 @@ def arguments():
     p.add_argument("--rate", type=float, help="default: 2e-3 (short), 0.05 (paper)")
     p.add_argument("--init-weights", help="a state_dict to start from; layers of another shape are left out and named")
     p.add_argument("--plain-share", type=float, default=0.0, help="share of the photographs shown as they are, as dry")
+    p.add_argument("--finer-share", type=float, default=0.0, help="share of the renders taken by a camera of more pixels")
     p.add_argument("--seed", type=int, default=2024)
     p.add_argument("--workers", type=int, default=1)
     p.add_argument("--threads", type=int, default=1)

@@ -1,4 +1,7 @@
-//! What the network reads on the reference car's road pictures: one CSV line per seed and true friction, on standard output.
+//! What the network reads on the reference car's road pictures: one CSV line per size, true friction and seed.
+//!
+//! `cargo run --release --example read_reference_camera -- FIRST_SEED > readings.csv`: 40 roads each. Seeds from 5000 are for
+//! development, from 9000 for the model card.
 
 use std::path::Path;
 
@@ -7,37 +10,40 @@ use gripsight_friction::{
 };
 use gripsight_reference_car::RoadCamera;
 
-const SIDE: u32 = 256;
-const SEEDS: std::ops::Range<u64> = 1000..1040;
+/// The reference car's own camera, and a larger one.
+const SIDES: [u32; 2] = [RoadCamera::SIDE_PX, 256];
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let first: u64 = std::env::args().nth(1).ok_or("usage: read_reference_camera FIRST_SEED")?.parse()?;
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let network = OnnxRuntime::load(&find_library(None, here)?, &find_model(None, here)?)?;
     let mut estimator =
         FrictionEstimator::new(Settings::default(), Basis::builtin()?, Some(Box::new(network)));
-    println!("true_mu,seed,valid,reason,mu,sigma,p_dry,p_wet,p_water,p_snow,p_ice");
-    for tenths in 1..=9 {
-        let true_mu = f64::from(tenths) / 10.0;
-        for seed in SEEDS {
-            let picture = RoadCamera::new(seed).picture(SIDE, 3.0, true_mu);
-            let raw = RawPicture {
-                width: SIDE,
-                height: SIDE,
-                step: SIDE * 3,
-                encoding: "rgb8",
-                big_endian: false,
-                data: &picture.data,
-            };
-            let got = estimator.read_single(&Frame { stamp_ns: 0, data: FrameData::Raw(raw) });
-            let p: Vec<String> = got.probability.iter().map(|p| format!("{p:.4}")).collect();
-            let reason = got.reason.map_or("", |r| r.as_str());
-            println!(
-                "{true_mu:.1},{seed},{},{reason},{:.4},{:.4},{}",
-                got.valid(),
-                got.mu,
-                got.sigma,
-                p.join(",")
-            );
+    println!("side,true_mu,seed,valid,reason,mu,sigma,p_dry,p_wet,p_water,p_snow,p_ice");
+    for side in SIDES {
+        for tenths in 1..=9 {
+            let true_mu = f64::from(tenths) / 10.0;
+            for seed in first..first + 40 {
+                let picture = RoadCamera::new(seed).picture(side, 3.0, true_mu);
+                let raw = RawPicture {
+                    width: side,
+                    height: side,
+                    step: side * 3,
+                    encoding: "rgb8",
+                    big_endian: false,
+                    data: &picture.data,
+                };
+                let got = estimator.read_single(&Frame { stamp_ns: 0, data: FrameData::Raw(raw) });
+                let p: Vec<String> = got.probability.iter().map(|p| format!("{p:.4}")).collect();
+                let reason = got.reason.map_or("", |r| r.as_str());
+                println!(
+                    "{side},{true_mu:.1},{seed},{},{reason},{:.4},{:.4},{}",
+                    got.valid(),
+                    got.mu,
+                    got.sigma,
+                    p.join(",")
+                );
+            }
         }
     }
     Ok(())

@@ -1,0 +1,120 @@
+"""Bad pictures kept for the test: nothing here is shown in training or looked at before the test.
+
+Signatures: see `degradations`.
+"""
+
+import cv2
+import numpy as np
+
+from degradations_tools import outlier_photo
+
+
+def salt_and_pepper(rng, bank, road, photographs):
+    hit = rng.random(road.shape[:2]) < rng.uniform(0.15, 0.6)
+    out = road.copy()
+    out[hit] = np.where(rng.random(int(hit.sum())) < 0.5, 0, 255)[:, None]
+    return out
+
+
+def motion_smear(rng, bank, road, photographs):
+    n = int(road.shape[0] * rng.uniform(0.3, 0.7)) | 1
+    kernel = np.full((n, 1), 1.0 / n, np.float32)
+    return cv2.filter2D(road, -1, kernel if rng.random() < 0.5 else kernel.T)
+
+
+def droplets(rng, bank, road, photographs):
+    size = road.shape[0]
+    out, y, x = road.astype(np.float32), *np.mgrid[:size, :size]
+    soft = cv2.GaussianBlur(out, (0, 0), size / 28)
+    for _ in range(int(rng.integers(25, 60))):
+        cx, cy, r = rng.uniform(0, size), rng.uniform(0, size), rng.uniform(0.04, 0.13) * size
+        inside = np.clip(1.5 * (1 - np.hypot(x - cx, y - cy) / r), 0, 1)[:, :, None]
+        out = out * (1 - inside) + inside * (soft[::-1] * 1.15)
+    return np.clip(out, 0, 255).astype(np.uint8)
+
+
+def banding(rng, bank, road, photographs):
+    rows = rng.normal(0, rng.uniform(40, 90), (road.shape[0], 1, 1))
+    return np.clip(road + rows, 0, 255).astype(np.uint8)
+
+
+def test_pattern(rng, bank, road, photographs):
+    size, n = road.shape[0], int(rng.integers(4, 16))
+    y, x = np.mgrid[:size, :size]
+    if rng.random() < 0.5:
+        return np.repeat(((((x * n // size) + (y * n // size)) % 2) * 255).astype(np.uint8)[:, :, None], 3, 2)
+    bars = rng.integers(0, 2, (n, 3)).astype(np.uint8) * 255
+    return bars[x * n // size]
+
+
+def broken_blocks(rng, bank, road, photographs):
+    out, b = road.copy(), max(road.shape[0] // 14, 4)
+    start = rng.uniform(0.0, 0.3)
+    for y in range(int(start * road.shape[0]) // b * b, road.shape[0], b):
+        out[y:y + b] = np.roll(out[y:y + b], int(rng.integers(road.shape[1])), 1)
+        out[y:y + b] = np.clip(out[y:y + b].astype(int) + rng.integers(-90, 90, 3), 0, 255)
+    return out
+
+
+def occlusion(rng, bank, road, photographs):
+    out, size = road.copy(), road.shape[0]
+    n = int(size * rng.uniform(0.6, 0.9))
+    colour = rng.uniform(0, 90, 3).astype(np.uint8)
+    out[(slice(None, n), slice(None)) if rng.random() < 0.5 else (slice(None), slice(None, n))] = colour
+    return out
+
+
+def swapped_channels(rng, bank, road, photographs):
+    return np.ascontiguousarray(road[:, :, ::-1])
+
+
+def grille(rng, bank, road, photographs):
+    """A mesh in front of the lens, out of focus."""
+    size, period = road.shape[0], rng.uniform(0.06, 0.15) * road.shape[0]
+    y, x = np.mgrid[:size, :size].astype(np.float32)
+    wire = np.minimum(np.abs((x + y) % period - period / 2), np.abs((x - y) % period - period / 2)) < period * rng.uniform(0.15, 0.25)
+    alpha = cv2.GaussianBlur(wire.astype(np.float32), (0, 0), rng.uniform(0.5, 3))[:, :, None]
+    return (road + alpha * (rng.uniform(5, 200) - road)).astype(np.uint8)
+
+
+def combed(rng, bank, road, photographs):
+    """Interlaced halves that do not belong together."""
+    out = road.copy()
+    out[1::2] = np.roll(road[::-1], int(rng.integers(10, road.shape[1] // 2)), 1)[1::2]
+    return out
+
+
+def cracked_lens(rng, bank, road, photographs):
+    """Shards, each showing another place, with bright edges."""
+    size, n = road.shape[0], int(rng.integers(12, 30))
+    y, x = np.mgrid[:size, :size].astype(np.float32)
+    seeds = rng.uniform(0, size, (n, 2)).astype(np.float32)
+    away = np.hypot(y[:, :, None] - seeds[:, 0], x[:, :, None] - seeds[:, 1])
+    near = np.sort(away, 2)
+    shift = rng.uniform(-0.2, 0.2, (n, 2)).astype(np.float32)[away.argmin(2)] * size
+    out = cv2.remap(road, x + shift[:, :, 1], y + shift[:, :, 0], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT_101)
+    out[near[:, :, 1] - near[:, :, 0] < 1.5] = 235
+    return out
+
+
+def rain_streaks(rng, bank, road, photographs):
+    """Water running down the lens: long bent strips of the blurred picture."""
+    size = road.shape[0]
+    wander = bank.sample(rng, 3.0, size, 3.0, 0.0, 4.0)
+    x = np.arange(size, dtype=np.float32)[None, :] + 8 * wander
+    strip = np.clip(2 * np.sin(x * 2 * np.pi / rng.uniform(0.08, 0.2) / size) + rng.uniform(0, 1), 0, 1)[:, :, None]
+    soft = cv2.GaussianBlur(road, (0, 0), size / 25).astype(np.float32)[:, ::-1]
+    return np.clip(road + strip * (soft * rng.uniform(0.9, 1.3) - road), 0, 255).astype(np.uint8)
+
+
+def night(rng, bank, road, photographs):
+    """A spot of headlight on an otherwise black road, much noise."""
+    size = road.shape[0]
+    y, x = np.mgrid[:size, :size] / size
+    spot = np.exp(-(((x - rng.uniform(0.3, 0.7)) / 0.25) ** 2 + ((y - rng.uniform(0.5, 0.9)) / 0.2) ** 2))[:, :, None]
+    noise = rng.uniform(5, 14) * rng.standard_normal(road.shape)
+    return np.clip(road * (0.02 + rng.uniform(0.5, 1.2) * spot) + noise, 0, 255).astype(np.uint8)
+
+
+FAMILIES = (salt_and_pepper, motion_smear, droplets, banding, test_pattern, broken_blocks, occlusion, swapped_channels,
+            outlier_photo("ground"), outlier_photo("sett"), outlier_photo("paving_stones"), grille, combed, cracked_lens, rain_streaks, night)
