@@ -336,7 +336,7 @@ def record(out, name, plant, track_name, reverse, mu, pace, seed, duration_s, di
 
 
 ford, bmw = parameters_vehicle1, parameters_vehicle2
-# name, plant, track, reverse, mu, pace, seed, steering dither (rad)
+# name, plant, track, reverse, mu, pace, seed, steering dither (rad). Those named test_ are looked at for published figures only.
 DRIVES = [
     ("slipx_mu08", lambda: Slipx(0.8), "kidney", False, 0.8, 0.85, 11, 0.02),
     ("slipx_mu11", lambda: Slipx(1.1), "serpentine", True, 1.1, 0.78, 12, 0.02),
@@ -344,6 +344,12 @@ DRIVES = [
     ("bmw_mu09", lambda: Multibody(bmw, 0.9), "serpentine", True, 0.9, 0.76, 14, 0.004),
     ("ford_mu06", lambda: Multibody(ford, 0.6), "kidney", True, 0.6, 0.80, 15, 0.004),
     ("ford_mu09", lambda: Multibody(ford, 0.9), "rounded_square", False, 0.9, 0.80, 16, 0.004),
+    ("test_slipx_mu07", lambda: Slipx(0.7), "rounded_square", True, 0.7, 0.82, 31, 0.02),
+    ("test_slipx_mu10", lambda: Slipx(1.0), "kidney", True, 1.0, 0.62, 32, 0.02),
+    ("test_bmw_mu07", lambda: Multibody(bmw, 0.7), "kidney", True, 0.7, 0.76, 33, 0.004),
+    ("test_bmw_mu10", lambda: Multibody(bmw, 1.0), "rounded_square", True, 1.0, 0.66, 34, 0.004),
+    ("test_ford_mu07", lambda: Multibody(ford, 0.7), "serpentine", False, 0.7, 0.76, 35, 0.004),
+    ("test_ford_mu08", lambda: Multibody(ford, 0.8), "kidney", False, 0.8, 0.76, 36, 0.004),
 ]
 
 

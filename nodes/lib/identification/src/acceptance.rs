@@ -6,8 +6,8 @@ use crate::{Identification, Outcome, PeakFriction};
 /// A new set may predict held-out data this much worse than the previous one and still replace it: both are within noise.
 const NO_WORSE: f64 = 1.02;
 
-/// Largest scatter of v_y, as a share of the rear slips visited, that tires can be fitted through.
-const V_Y_SHARE: f64 = 0.2;
+/// Largest scatter of v_y, as a share of the slip at which the rear tires' linear force would meet their peak, that tires can be fitted through.
+const V_Y_SHARE: f64 = 0.25;
 
 /// No steering that a driver can race with answers later than this.
 const LONGEST_DELAY_S: f64 = 0.2;
@@ -29,17 +29,17 @@ pub(crate) fn judge(run: &Identification, outcome: &mut Outcome) {
     if !shape.is_empty() {
         remarks.push(format!("on a bound, within a shape that the data hardly tell: {}", shape.join(", ")));
     }
-    // What the scatter of v_y makes of the rear slip at the mean speed.
-    let slip = &outcome.slip_range_rad.rear;
-    let visited_rad = slip.low.abs().max(slip.high.abs());
+    // What the scatter of v_y makes of the rear slip at the mean speed, against the slip at which the rear tires bend.
+    let rear = &outcome.phi_p.rear;
+    let knee_rad = rear.d / rear.normalized_stiffness();
     let scatter_mps = outcome.rmse.noise[0];
     let scatter_rad = scatter_mps / outcome.mean_speed_mps;
-    if scatter_rad > V_Y_SHARE * visited_rad {
+    if scatter_rad > V_Y_SHARE * knee_rad {
         against.push(format!(
-            "v_y scatters by {scatter_mps:.3} m/s about any model: {:.1} degrees of slip where the rear slip stayed within {:.1} degrees (at most {:.0} % \
+            "v_y scatters by {scatter_mps:.3} m/s about any model: {:.1} degrees of slip where the rear tires bend at {:.1} degrees (at most {:.0} % \
              of it can be used); it cannot support the rear tires",
             scatter_rad.to_degrees(),
-            visited_rad.to_degrees(),
+            knee_rad.to_degrees(),
             100.0 * V_Y_SHARE
         ));
         drive.push(

@@ -7,7 +7,7 @@ use gripsight_vehicle::{
 };
 
 use crate::data::Part;
-use crate::direct::height_error;
+use crate::direct::{PeakEvidence, standard_error};
 use crate::judge::{best_starts, errors_over_horizon, one_step_errors, rollout_errors};
 use crate::picture::{curves, trace};
 use crate::rollout::{NAMES, PARAMETERS, SIGNALS, TireRollout, vector_of};
@@ -19,6 +19,9 @@ use crate::{
 
 /// The residual loop has to beat the direct fit on the validation part by this share: of near equals the simpler wins.
 const LOOP_GAIN: f64 = 0.01;
+/// And it may not be worse than the direct fit by more than this share where there are more data, on the training part: the best of some turns
+/// on a few seconds may be luck.
+const LOOP_LOSS: f64 = 0.02;
 /// Longest horizon of the rollout errors.
 const HORIZON_S: f64 = 2.0;
 /// Below this share of information from the data a correction rests on its prior.
@@ -65,7 +68,7 @@ pub(crate) fn refused(
         signals: SignalCorrections::NONE,
         signal_intervals: SignalEstimates::from_array([unknown; 6]),
         weak_signals: Vec::new(),
-        nuisance: Nuisance { relaxation_m: f64::NAN, combined_slip: f64::NAN },
+        nuisance: Nuisance { relaxation_m: f64::NAN, combined_slip: f64::NAN, load_transfer: f64::NAN },
         rmse: RmseReport { one_step: rmse, rollout: rmse, horizon_s: f64::NAN, noise: [f64::NAN; 2] },
         rollout_error: Vec::new(),
         source: Source::Start,
@@ -163,10 +166,13 @@ fn choose(run: &Identification) -> (PacejkaParameters, Source) {
         return (last(), Source::ResidualLoop);
     }
     let best = run.history.iter().min_by(|a, b| a.validation_rmse.total_cmp(&b.validation_rmse));
+    let better = |tires: &PacejkaParameters, validation_rmse: f64| {
+        validation_rmse < (1.0 - LOOP_GAIN) * run.direct_error
+            && run.error_on(Part::Training, tires)
+                < (1.0 + LOOP_LOSS) * run.error_on(Part::Training, &run.direct.tires)
+    };
     match best {
-        Some(turn)
-            if !run.config.direct_start || turn.validation_rmse < (1.0 - LOOP_GAIN) * run.direct_error =>
-        {
+        Some(turn) if !run.config.direct_start || better(&turn.phi_p, turn.validation_rmse) => {
             (turn.phi_p, Source::ResidualLoop)
         }
         _ => (run.direct.tires, Source::LeastSquares),
@@ -182,7 +188,7 @@ fn around(value: f64, direct: f64, error: Option<f64>) -> Estimate {
 fn stiffness(run: &Identification, tires: &PacejkaParameters) -> PerAxle<Estimate> {
     let axle = |axle: &MagicFormula, direct: &MagicFormula, offset: usize, load_n: f64| {
         let (k, d) = (axle.normalized_stiffness(), direct.normalized_stiffness());
-        let e = around(k, d, run.direct.fit.standard_error(offset));
+        let e = around(k, d, standard_error(&run.direct.fit, offset));
         Estimate { value: e.value * load_n, low: e.low.max(0.0) * load_n, high: e.high * load_n }
     };
     PerAxle {
@@ -192,12 +198,12 @@ fn stiffness(run: &Identification, tires: &PacejkaParameters) -> PerAxle<Estimat
 }
 
 fn peak_friction(run: &Identification, tires: &PacejkaParameters) -> PerAxle<PeakFriction> {
-    let axle = |axle: &MagicFormula, direct: &MagicFormula, offset: usize, reached: bool| {
+    let axle = |axle: &MagicFormula, direct: &MagicFormula, peak: &PeakEvidence| {
+        let reached = peak.reached;
         if reached {
-            let slips = if offset == 0 { &run.direct.slips.front } else { &run.direct.slips.rear };
-            let error = height_error(&run.direct.fit, offset, slips);
-            let e = around(axle.d, direct.d, error.is_finite().then_some(error));
-            PeakFriction { value: e.value, low: e.low.max(0.0), high: e.high, reached, from_prior: false }
+            let half = peak.half_width + (axle.d - direct.d).abs();
+            let (low, high) = ((axle.d - half).max(0.0), axle.d + half);
+            PeakFriction { value: axle.d, low, high, reached, from_prior: false }
         } else {
             let half = run.prior.map_or(f64::NAN, |p| Estimate::Z90 * p.sigma);
             let from_prior = run.prior.is_some();
@@ -212,8 +218,8 @@ fn peak_friction(run: &Identification, tires: &PacejkaParameters) -> PerAxle<Pea
     };
     let (peak, direct) = (&run.direct.peak, &run.direct.tires);
     PerAxle {
-        front: axle(&tires.front, &direct.front, 0, peak.front.reached),
-        rear: axle(&tires.rear, &direct.rear, 4, peak.rear.reached),
+        front: axle(&tires.front, &direct.front, &peak.front),
+        rear: axle(&tires.rear, &direct.rear, &peak.rear),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::{MagicFormula, PacejkaParameters, SingleTrack};
 
-use crate::direct::{Slips, force_error};
+use crate::direct::{Slips, covariance_of, force_error};
 use crate::judge::best_starts;
 use crate::rollout::{PARAMETERS, TireRollout, tires_of};
 use crate::shooting::{Rollout, Window};
@@ -39,7 +39,7 @@ fn curve(
             *count += 1;
         }
     }
-    let covariance = run.direct.fit.covariance_of(&[offset, offset + 1, offset + 2, offset + 3]);
+    let covariance = covariance_of(&run.direct.fit, &[offset, offset + 1, offset + 2, offset + 3]);
     let half: Vec<f64> =
         slip_rad.iter().map(|&a| Estimate::Z90 * force_error(axle, a, covariance.as_ref())).collect();
     let identified: Vec<f64> = slip_rad.iter().map(|&a| axle.normalized_force(a)).collect();

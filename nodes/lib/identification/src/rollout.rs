@@ -4,9 +4,10 @@
 //! the centre of gravity: F_y/F_z is the tires' own only with the load that was on them. And the slip that makes the force follows the slip of
 //! the axle over a relaxation length, d(alpha')/dt = (alpha - alpha') v_x/sigma: without it the lag of a real tire reads as stiffness, delay and lever arm.
 //! And driving and braking take from the lateral force along the friction ellipse, F_y sqrt(1 - (k F_x/(D F_z))^2), F_x from the acceleration and the
-//! known split of drive and brake.
+//! known split of drive and brake; the front wheels' F_x pulls to the side that they are turned to.
 //!
-//! Relaxation length and k are nuisances of the estimation, not results: Phi_p goes to models that have neither.
+//! Relaxation length, k and the share of m a_x h/L that really is shifted (springs, and tires that gain less grip than load) are nuisances of the
+//! estimation, not results: Phi_p goes to models that have none of them.
 
 use gripsight_signals::Segment;
 use gripsight_vehicle::{
@@ -20,14 +21,17 @@ use crate::data::Data;
 use crate::shooting::{Rollout, Window};
 
 /// Number of parameters of [`TireRollout`]: (k, C, D, E) front and rear with k = B C D, the
-/// signal corrections, the tires' relaxation length, and how much longitudinal force takes from the lateral.
-pub(crate) const PARAMETERS: usize = 16;
+/// signal corrections, the tires' relaxation length, how much longitudinal force takes from the lateral, and how much of the
+/// load transfer is felt.
+pub(crate) const PARAMETERS: usize = 17;
 /// Place of the first signal correction.
 pub(crate) const SIGNALS: usize = 8;
 /// Place of the relaxation length.
 pub(crate) const RELAXATION: usize = 14;
 /// Place of the share of combined slip.
 pub(crate) const COMBINED: usize = 15;
+/// Place of the share of load transfer.
+pub(crate) const TRANSFER: usize = 16;
 /// Names of the parameters, with their units where they have one.
 pub(crate) const NAMES: [&str; PARAMETERS] = [
     "front.k",
@@ -46,6 +50,7 @@ pub(crate) const NAMES: [&str; PARAMETERS] = [
     "yaw_rate_bias_radps",
     "relaxation_m",
     "combined_slip",
+    "load_transfer",
 ];
 
 /// What the estimation allows for and Phi_p does not hold.
@@ -55,11 +60,13 @@ pub struct Nuisance {
     pub relaxation_m: f64,
     /// How much of the friction ellipse is at work: 0 none, 1 all.
     pub combined_slip: f64,
+    /// Share of the longitudinal load transfer that the tires feel: 0 none, 1 that of a rigid car on tires without load sensitivity.
+    pub load_transfer: f64,
 }
 
 /// Nuisances of a parameter vector.
 pub(crate) fn nuisance_of(p: &[f64]) -> Nuisance {
-    Nuisance { relaxation_m: p[RELAXATION], combined_slip: p[COMBINED] }
+    Nuisance { relaxation_m: p[RELAXATION], combined_slip: p[COMBINED], load_transfer: p[TRANSFER] }
 }
 
 /// Predicts what the sensors report of v_y and yaw rate.
@@ -77,9 +84,11 @@ struct Drive<T> {
     v_x_mps: f64,
     steering_rad: T,
     /// Share of the front and of the rear static load that is on the axle.
-    load: [f64; 2],
+    load: [T; 2],
     /// Longitudinal over vertical force of either axle.
-    pull: [f64; 2],
+    pull: [T; 2],
+    /// Longitudinal force of the front axle.
+    front_pull_n: f64,
 }
 
 /// What a rollout shows at a sample.
@@ -89,7 +98,7 @@ pub(crate) struct Visit<T = f64> {
     pub(crate) input: Input<T>,
     /// Slips, front and rear, that make the force: behind those of the axles by the relaxation length.
     slip_rad: (T, T),
-    pull: [f64; 2],
+    pull: [T; 2],
 }
 
 impl Visit {
@@ -104,13 +113,14 @@ impl Visit {
 }
 
 /// F_y/F_z at a slip beside a longitudinal force.
-fn left_beside<T: Real>(tire: &MagicFormula<T>, combined: T, slip: T, pull: f64) -> T {
-    let d = tire.d.re();
-    let used = combined.re() * pull / d;
+fn left_beside<T: Real>(tire: &MagicFormula<T>, combined: T, slip: T, pull: T) -> T {
+    let (d, k, pull_share) = (tire.d.re(), combined.re(), pull.re());
+    let used = k * pull_share / d;
     let left = 1.0 - used * used;
     let left = if left > LEAST_LEFT {
         let left = left.sqrt();
-        T::chain(left, [(-used * pull / (d * left), &combined), (used * used / (d * left), &tire.d)])
+        let by = -used / (d * left);
+        T::chain(left, [(by * pull_share, &combined), (-by * used, &tire.d), (by * k, &pull)])
     } else {
         T::from(LEAST_LEFT.sqrt())
     };
@@ -140,17 +150,21 @@ impl<'a> TireRollout<'a> {
         let delay_samples = p[SIGNALS] / segment.dt_s;
         let (front_n, rear_n) = (self.vehicle.static_load_front_n(), self.vehicle.static_load_rear_n());
         let transfer_kg = self.vehicle.mass_kg * self.vehicle.h_cg_m / self.vehicle.wheelbase_m();
+        let least = |load: T| if load.re() < LEAST_LOAD { T::from(LEAST_LOAD) } else { load };
         let drive = |k: usize| {
-            let shifted_n = transfer_kg * self.a_x_mps2[window.segment][k];
+            let shifted_n = p[TRANSFER] * (transfer_kg * self.a_x_mps2[window.segment][k]);
             let steering_rad =
                 delayed(&segment.steering_rad, k, delay_samples) * p[SIGNALS + 1] + p[SIGNALS + 2];
-            let load =
-                [(1.0 - shifted_n / front_n).max(LEAST_LOAD), (1.0 + shifted_n / rear_n).max(LEAST_LOAD)];
+            let load = [least(-shifted_n / front_n + 1.0), least(shifted_n / rear_n + 1.0)];
             let force_n = self.vehicle.mass_kg * self.a_x_mps2[window.segment][k];
             let front =
                 if force_n > 0.0 { self.vehicle.drive_front_share } else { self.vehicle.brake_front_share };
-            let pull = [front * force_n / (front_n * load[0]), (1.0 - front) * force_n / (rear_n * load[1])];
-            Drive { v_x_mps: segment.v_x_mps[k], steering_rad, load, pull }
+            let front_pull_n = front * force_n;
+            let pull = [
+                load[0].recip() * (front_pull_n / front_n),
+                load[1].recip() * ((force_n - front_pull_n) / rear_n),
+            ];
+            Drive { v_x_mps: segment.v_x_mps[k], steering_rad, load, pull, front_pull_n }
         };
         let end = window.from + window.len;
         let slowest = segment.v_x_mps[window.from..end].iter().copied().fold(f64::INFINITY, f64::min);
@@ -203,18 +217,21 @@ impl<'a> TireRollout<'a> {
         let v = self.vehicle;
         let front = left_beside(&car.front, combined, slip.0, drive.pull[0]);
         let rear = left_beside(&car.rear, combined, slip.1, drive.pull[1]);
-        let loads_n = [v.static_load_front_n() * drive.load[0], v.static_load_rear_n() * drive.load[1]];
+        let static_n = [v.static_load_front_n(), v.static_load_rear_n()];
+        let loads_n = [static_n[0] * drive.load[0].re(), static_n[1] * drive.load[1].re()];
         let (sin, cos) = drive.steering_rad.re().sin_cos();
-        let across_n = front.re() * loads_n[0];
-        let (front_n, rear_n) = (across_n * cos, rear.re() * loads_n[1]);
+        let (across_n, along_n) = (front.re() * loads_n[0], drive.front_pull_n);
+        let (front_n, rear_n) = (across_n * cos + along_n * sin, rear.re() * loads_n[1]);
         // The same line for v_y and yaw rate: what a newton at the front and one at the rear do.
         let rate = |value: f64, by_front: f64, by_rear: f64, by_yaw_rate: f64| {
             T::chain(
                 value,
                 [
                     (by_front * loads_n[0] * cos, &front),
-                    (-by_front * across_n * sin, &drive.steering_rad),
+                    (by_front * front.re() * static_n[0] * cos, &drive.load[0]),
+                    (by_front * (along_n * cos - across_n * sin), &drive.steering_rad),
                     (by_rear * loads_n[1], &rear),
+                    (by_rear * rear.re() * static_n[1], &drive.load[1]),
                     (by_yaw_rate, &x.yaw_rate_radps),
                 ],
             )
@@ -248,6 +265,7 @@ impl<T: Real> Drive<T> {
             steering_rad: between(&self.steering_rad, &next.steering_rad, T::from(share)),
             load: std::array::from_fn(|i| self.load[i] + (next.load[i] - self.load[i]) * share),
             pull: std::array::from_fn(|i| self.pull[i] + (next.pull[i] - self.pull[i]) * share),
+            front_pull_n: self.front_pull_n + (next.front_pull_n - self.front_pull_n) * share,
         }
     }
 }
@@ -285,6 +303,7 @@ pub(crate) fn vector_of(
         4..8 => rear[j - 4],
         RELAXATION => nuisance.relaxation_m,
         COMBINED => nuisance.combined_slip,
+        TRANSFER => nuisance.load_transfer,
         _ => signals[j - SIGNALS],
     })
 }

@@ -227,8 +227,13 @@ impl Identification {
 
     /// Error of rollouts on the validation part, in noises.
     pub(crate) fn validation_error(&self, tires: &PacejkaParameters) -> f64 {
+        self.error_on(Part::Validation, tires)
+    }
+
+    /// Error of rollouts on a part, in noises.
+    pub(crate) fn error_on(&self, part: Part, tires: &PacejkaParameters) -> f64 {
         let rollout = TireRollout::new(&self.vehicle, &self.data);
-        let windows = self.data.part(Part::Validation);
+        let windows = self.data.part(part);
         let p = vector_of(tires, &self.direct.corrections, &self.direct.nuisance);
         rollout_errors(&rollout, &p, &windows, &self.direct.scatter).normalized
     }

@@ -6,6 +6,7 @@ use anyhow::{Context, Result};
 use gripsight_bag::{TopicMap, read_sequences};
 use gripsight_identification::nelder_mead::{NelderMeadConfig, minimize};
 use gripsight_identification::{PerAxle, tires::BOUNDS};
+use gripsight_reference_car::Recording;
 use gripsight_signals::{StateSequence, WindowConfig};
 use gripsight_vehicle::{MagicFormula, PacejkaParameters, VehicleParameters};
 
@@ -32,6 +33,12 @@ pub(crate) fn reference_run(car: &str, track: &str, mu: f64, pace: f64, seed: u6
     let plain = reference::scenario(car, track, mu, pace, seed);
     let scenario = if background { reference::with_background(plain) } else { plain };
     let (recording, sequence, vehicle) = reference::drive(scenario);
+    let truth = truth_of(&recording, &vehicle);
+    Run { name: format!("{car} {track} mu {mu} pace {pace} seed {seed}"), vehicle, sequence, truth }
+}
+
+/// What the plant's axles did, at the slips of the single-track car.
+pub(crate) fn truth_of(recording: &Recording, vehicle: &VehicleParameters) -> PerAxle<Truth> {
     let mut truth = PerAxle::<Truth>::default();
     for t in &recording.truth {
         let m = &t.motion;
@@ -47,7 +54,7 @@ pub(crate) fn reference_run(car: &str, track: &str, mu: f64, pace: f64, seed: u6
         truth.front.force.push(f[1] / f[2]);
         truth.rear.force.push(r[1] / r[2]);
     }
-    Run { name: format!("{car} {track} mu {mu} pace {pace} seed {seed}"), vehicle, sequence, truth }
+    truth
 }
 
 /// The first window of a bag folder (`NAME/NAME.mcap`, `vehicle.yaml`).

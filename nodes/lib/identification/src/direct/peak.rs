@@ -4,60 +4,51 @@ use gripsight_vehicle::MagicFormula;
 use nalgebra::{DMatrix, DVector};
 
 use crate::Estimate;
-use crate::direct::Slips;
+use crate::direct::{Slips, covariance_of};
 use crate::rollout::tires_of;
 use crate::shooting::Fit;
 
-/// Whether an axle's peak shows in the data.
+/// Whether an axle's peak shows in the data, and how well it is known then.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PeakEvidence {
     pub(crate) reached: bool,
+    /// Half of D's 90 % interval.
+    pub(crate) half_width: f64,
 }
 
-/// Share of D that the curve has to reach within the slips visited.
-const PEAK_SHARE: f64 = 0.96;
+/// A peak is reached when D is known to this share of itself.
+const KNOWN: f64 = 0.1;
+/// Half of the 90 % interval of D that the shape of a four-parameter curve costs, as a share of D: real curves have another shape.
+const FORM: f64 = 0.05;
 /// What the stiffness alone would make of the largest slip has to exceed D by this factor: a knee that comes earlier is the model's, not the tire's.
 const PEAK_EXCESS: f64 = 1.6;
 /// No tire slides at less: a knee that comes earlier is made by the signals.
 const LEAST_PEAK_SLIP_RAD: f64 = 0.05;
-/// Relative standard error of the curve at the largest slip above which the data do not determine it.
-const PEAK_ERROR: f64 = 0.08;
-/// The curve is flat where the upper end of the 90 % interval of its slope is below this share of its slope at zero.
-const FLAT: f64 = 0.15;
 
-/// Whether an axle's peak shows: the curve has flattened within the slips visited, and the data fix its height and its slope there.
+/// Whether an axle's peak shows. What is uncertain of D: the height of the curve where it was driven, as far as the data tell; all that D lies
+/// above that; and the curve's form.
 pub(super) fn evidence(fit: &Fit, offset: usize, slips: &Slips) -> PeakEvidence {
     let tires = tires_of(&fit.parameters);
     let axle = if offset == 0 { tires.front } else { tires.rear };
     let furthest = slips.range_rad.low.abs().max(slips.range_rad.high.abs());
-    let force = axle.max_force_within(furthest);
-    let covariance = fit.covariance_of(&[offset, offset + 1, offset + 2, offset + 3]);
-    let error = height_error(fit, offset, slips);
-    let slope = |axle: &MagicFormula| slope(axle, furthest);
-    let steepest = slope(&axle) + Estimate::Z90 * error_of(&axle, covariance.as_ref(), slope);
-    let reached = furthest > LEAST_PEAK_SLIP_RAD
-        && force > PEAK_SHARE * axle.d
+    let beyond = axle.d - axle.max_force_within(furthest);
+    let height = Estimate::Z90 * height_error(fit, offset, slips);
+    let half_width = height.hypot(beyond).hypot(FORM * axle.d);
+    let reached = half_width < KNOWN * axle.d
+        && furthest > LEAST_PEAK_SLIP_RAD
         && axle.normalized_stiffness() * furthest > PEAK_EXCESS * axle.d
-        && error < PEAK_ERROR * force
-        && steepest < FLAT * axle.normalized_stiffness()
         && !fit.on_bound.contains(&(offset + 2));
-    PeakEvidence { reached }
+    PeakEvidence { reached, half_width }
 }
 
 /// Standard error of the largest F_y/F_z within the slips visited; infinite where nothing is known of it. (That of D alone says little of a
 /// plateau: there C and D make up for each other.)
-pub(crate) fn height_error(fit: &Fit, offset: usize, slips: &Slips) -> f64 {
+fn height_error(fit: &Fit, offset: usize, slips: &Slips) -> f64 {
     let tires = tires_of(&fit.parameters);
     let axle = if offset == 0 { tires.front } else { tires.rear };
     let furthest = slips.range_rad.low.abs().max(slips.range_rad.high.abs());
-    let covariance = fit.covariance_of(&[offset, offset + 1, offset + 2, offset + 3]);
+    let covariance = covariance_of(fit, &[offset, offset + 1, offset + 2, offset + 3]);
     error_of(&axle, covariance.as_ref(), |axle| axle.max_force_within(furthest))
-}
-
-/// d(F_y/F_z)/d(slip), 1/rad.
-fn slope(axle: &MagicFormula, slip_rad: f64) -> f64 {
-    let h = 1e-3 * slip_rad.abs().max(1e-3);
-    (axle.normalized_force(slip_rad + h) - axle.normalized_force(slip_rad - h)) / (2.0 * h)
 }
 
 /// Standard error of F_y/F_z at a slip, from the covariance of (k, C, D, E); infinite without one.

@@ -14,8 +14,8 @@ const SIGNAL_PRIORS: [(f64, f64, f64, f64); 6] = [
     // Gain and offset: a servo's calibration.
     (1.0, 0.03, 0.6, 1.5),
     (0.0, 0.01, -0.15, 0.15),
-    // Lever arm: the odometry's point is meant to be the centre of gravity, or it is the rear axle (tried as a second start).
-    (0.0, 0.1, -0.8, 0.8),
+    // Lever arm: the odometry's point is meant to be the centre of gravity; the data overrule that where it is another.
+    (0.0, 0.07, -0.8, 0.8),
     // Bias of v_y: a heading error of half a degree.
     (0.0, 0.01, -0.1, 0.1),
     // Gyroscope.
@@ -26,7 +26,8 @@ const SIGNAL_PRIORS: [(f64, f64, f64, f64); 6] = [
 const RELAXATION_SHARES: [f64; 4] = [0.12, 0.1, 0.005, 0.6];
 /// Share of the friction ellipse: mean, sigma, low, high.
 const COMBINED_SLIP: [f64; 4] = [0.8, 0.3, 0.0, 1.3];
-
+/// Share of the longitudinal load transfer: mean, sigma, low, high. Half of it may be in a height that is guessed, and in load sensitivity.
+const LOAD_TRANSFER: [f64; 4] = [0.8, 0.4, 0.0, 2.0];
 /// The signal parameters with their priors, scaled to the car.
 pub(super) fn signal_parameters(data: &Data, vehicle: &VehicleParameters) -> Vec<Parameter> {
     let scales = [1.0, 1.0, 1.0, vehicle.wheelbase_m(), data.mean_speed_mps, 1.0];
@@ -50,8 +51,9 @@ pub(super) fn signal_parameters(data: &Data, vehicle: &VehicleParameters) -> Vec
     }
     let [mean, sigma, low, high] = RELAXATION_SHARES.map(|share| share * vehicle.wheelbase_m());
     all.push(Parameter { start: mean, low, high, free: true, prior: Some(Prior { mean, sigma }) });
-    let [mean, sigma, low, high] = COMBINED_SLIP;
-    all.push(Parameter { start: mean, low, high, free: true, prior: Some(Prior { mean, sigma }) });
+    for [mean, sigma, low, high] in [COMBINED_SLIP, LOAD_TRANSFER] {
+        all.push(Parameter { start: mean, low, high, free: true, prior: Some(Prior { mean, sigma }) });
+    }
     all
 }
 

@@ -6,6 +6,7 @@ use crate::shooting::{Fit, Rollout, Window};
 
 /// What residuals are divided by: the scatter of each channel about the fit (the median window's root mean square, at least the noise),
 /// times the root of their correlation length. Errors of the model are correlated; counted as independent they would overrule every prior.
+/// Beyond a window they are still the same errors, corner after corner: hence [`MISFIT`].
 pub(super) fn weights(model: &TireRollout<'_>, fit: &Fit, windows: &[Window], noise: &[f64; 2]) -> Weights {
     let (mut predicted, mut measured) = (Vec::new(), Vec::new());
     let mut squares = [Vec::new(), Vec::new()];
@@ -29,8 +30,11 @@ pub(super) fn weights(model: &TireRollout<'_>, fit: &Fit, windows: &[Window], no
         let rho = covariance[c].iter().skip(1).map(|v| v / covariance[c][0].max(f64::MIN_POSITIVE));
         1.0 + 2.0 * rho.take_while(|r| *r > 0.0).sum::<f64>()
     };
-    Weights { scatter, sigma: std::array::from_fn(|c| scatter[c] * length(c).sqrt()) }
+    Weights { scatter, sigma: std::array::from_fn(|c| scatter[c] * (MISFIT * length(c)).sqrt()) }
 }
+
+/// How much the scores of windows vary over what the correlation within them explains: 2 to 4 on development drives.
+const MISFIT: f64 = 4.0;
 
 /// Scatter of a fit.
 #[derive(Debug, Clone, Copy)]

@@ -72,6 +72,23 @@ impl Fit {
         }))
     }
 
+    /// Covariance of some parameters of the model where noise, errors of the model and priors are as large as the problem says: the inverse of
+    /// the information. Parameters that were not free, or ended on a bound, count as known. `None` where the information is singular.
+    #[must_use]
+    pub fn posterior_of(&self, parameters: &[usize]) -> Option<DMatrix<f64>> {
+        let mut information = self.linearization.information.clone();
+        let pinned: Vec<bool> = self.free.iter().map(|j| self.on_bound.contains(j)).collect();
+        pin(&mut information, None, &pinned);
+        let inverse = information.cholesky()?.inverse();
+        let place = |j: usize| self.free.iter().position(|&f| f == j).filter(|&p| !pinned[p]);
+        Some(DMatrix::from_fn(parameters.len(), parameters.len(), |a, b| {
+            match (place(parameters[a]), place(parameters[b])) {
+                (Some(a), Some(b)) => inverse[(a, b)],
+                _ => 0.0,
+            }
+        }))
+    }
+
     /// Standard error of parameter `j` of the model; `None` if it was not free or nothing is known of it.
     #[must_use]
     pub fn standard_error(&self, j: usize) -> Option<f64> {
