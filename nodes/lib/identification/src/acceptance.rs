@@ -77,6 +77,11 @@ pub(crate) fn judge(run: &Identification, outcome: &mut Outcome) {
         let what = format!("{axle} peak not reached: slip stayed within {furthest:.1} degrees");
         if from_prior {
             remarks.push(format!("{what}; D = {value:.2} is the prior's"));
+        } else if let Some(prior) = run.prior {
+            against.push(format!(
+                "{what}; the friction prior of {:.2} is below the force that these tires showed",
+                prior.mu
+            ));
         } else {
             against.push(format!("{what}; D = {value:.2} is a guess, give a friction prior"));
         }

@@ -205,8 +205,8 @@ fn peak_friction(run: &Identification, tires: &PacejkaParameters) -> PerAxle<Pea
             let (low, high) = ((axle.d - half).max(0.0), axle.d + half);
             PeakFriction { value: axle.d, low, high, reached, from_prior: false }
         } else {
-            let half = run.prior.map_or(f64::NAN, |p| Estimate::Z90 * p.sigma);
-            let from_prior = run.prior.is_some();
+            let from_prior = peak.from_prior(run.prior);
+            let half = run.prior.filter(|_| from_prior).map_or(f64::NAN, |p| Estimate::Z90 * p.sigma);
             PeakFriction {
                 value: axle.d,
                 low: (axle.d - half).max(0.0),

@@ -3,10 +3,10 @@
 use gripsight_vehicle::MagicFormula;
 use nalgebra::{DMatrix, DVector};
 
-use crate::Estimate;
 use crate::direct::{Slips, covariance_of};
 use crate::rollout::tires_of;
 use crate::shooting::Fit;
+use crate::{Estimate, FrictionPrior};
 
 /// Whether an axle's peak shows in the data, and how well it is known then.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,6 +14,15 @@ pub(crate) struct PeakEvidence {
     pub(crate) reached: bool,
     /// Half of D's 90 % interval.
     pub(crate) half_width: f64,
+    /// Largest F_y/F_z within the slips visited.
+    pub(crate) height: f64,
+}
+
+impl PeakEvidence {
+    /// Whether D is the friction prior's: the data do not show the peak, and the prior is not below what they do show.
+    pub(crate) fn from_prior(&self, prior: Option<FrictionPrior>) -> bool {
+        !self.reached && prior.is_some_and(|p| p.mu >= self.height)
+    }
 }
 
 /// A peak is reached when D is known to this share of itself.
@@ -31,14 +40,14 @@ pub(super) fn evidence(fit: &Fit, offset: usize, slips: &Slips) -> PeakEvidence 
     let tires = tires_of(&fit.parameters);
     let axle = if offset == 0 { tires.front } else { tires.rear };
     let furthest = slips.range_rad.low.abs().max(slips.range_rad.high.abs());
-    let beyond = axle.d - axle.max_force_within(furthest);
-    let height = Estimate::Z90 * height_error(fit, offset, slips);
-    let half_width = height.hypot(beyond).hypot(FORM * axle.d);
+    let height = axle.max_force_within(furthest);
+    let error = Estimate::Z90 * height_error(fit, offset, slips);
+    let half_width = error.hypot(axle.d - height).hypot(FORM * axle.d);
     let reached = half_width < KNOWN * axle.d
         && furthest > LEAST_PEAK_SLIP_RAD
         && axle.normalized_stiffness() * furthest > PEAK_EXCESS * axle.d
         && !fit.on_bound.contains(&(offset + 2));
-    PeakEvidence { reached, half_width }
+    PeakEvidence { reached, half_width, height }
 }
 
 /// Standard error of the largest F_y/F_z within the slips visited; infinite where nothing is known of it. (That of D alone says little of a
