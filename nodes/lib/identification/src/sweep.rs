@@ -4,11 +4,12 @@
 //! | | paper | robust |
 //! | --- | --- | --- |
 //! | speed | the mean of the run | the mean, raised until the front tires can saturate within the steering's range, within the speeds driven |
-//! | ramp | 0 to 0.4 rad in 10 s, to the left | until a slip leaves the hull of the data, 100 time constants long, both ways |
+//! | ramp | 0 to 0.4 rad in 10 s, to the left, until a slip leaves the hull of the data | until a slip is well outside the hull, 100 time constants long, both ways |
 //! | forces | steady state, m l/L v_x w | inverse dynamics with dv_y/dt and dw/dt |
-//! | residual outside the slips trained on | as it comes | faded out over a quarter of their range |
+//! | residual outside the slips trained on | not asked | faded out over a quarter of their range |
 //!
-//! 0.4 rad in 10 s are ForzaETH's; the paper states neither.
+//! 0.4 rad in 10 s are ForzaETH's; the paper states neither, nor where the ramp ends. Driven on to 0.4 rad, most of the ramp shows what the network
+//! makes up beyond its data, and the loop does not settle.
 
 use gripsight_s4::{ResidualNetwork, StreamState};
 use gripsight_vehicle::{GRAVITY_MPS2, Input, SingleTrack, State, VehicleParameters};
@@ -38,7 +39,7 @@ const PAPER_STEERING_RAD: f64 = 0.4;
 const PAPER_RAMP_S: f64 = 10.0;
 /// The robust ramp is this many time constants of the lateral motion long, from straight to the edge of the hull.
 const RAMP_TIME_CONSTANTS: f64 = 100.0;
-/// It ends where a slip is this far outside the hull, in widths of the hull.
+/// The robust ramp ends where a slip is this far outside the hull, in widths of the hull; the paper's at the hull.
 const BEYOND_HULL: f64 = 0.15;
 /// Straight driving before the ramp: the network's memory settles.
 const SETTLE_S: f64 = 1.0;
@@ -146,13 +147,12 @@ impl Test<'_> {
                 outside += u32::from(inside < 1.0);
                 self.push_points(&x, &next, &input, &next_input, points);
                 let beyond = |slip: f64, r: &Range| {
-                    let margin = BEYOND_HULL * (r.high - r.low);
+                    let margin =
+                        if self.method == Method::Paper { 0.0 } else { BEYOND_HULL * (r.high - r.low) };
                     slip > r.high + margin || slip < r.low - margin
                 };
                 let hull = &self.model.slip_range_rad;
-                if self.method == Method::Robust
-                    && (beyond(slip.front, &hull.front) || beyond(slip.rear, &hull.rear))
-                {
+                if beyond(slip.front, &hull.front) || beyond(slip.rear, &hull.rear) {
                     break;
                 }
             }
