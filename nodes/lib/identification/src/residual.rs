@@ -202,7 +202,7 @@ fn samples_of(data: &Data, stretch: &Window) -> Vec<(usize, Part)> {
 }
 
 /// Means over windows of `width` samples, twice: a low-pass without delay. All channels alike, so that what is linear in them stays true.
-fn smoothed(series: Vec<(State, Input)>, width: usize) -> Vec<(State, Input)> {
+fn smoothed(series: &[(State, Input)], width: usize) -> Vec<(State, Input)> {
     let half = width / 2;
     let once = |series: &[(State, Input)]| -> Vec<(State, Input)> {
         (0..series.len())
@@ -220,7 +220,7 @@ fn smoothed(series: Vec<(State, Input)>, width: usize) -> Vec<(State, Input)> {
             })
             .collect()
     };
-    once(&once(&series))
+    once(&once(series))
 }
 
 /// The paper's residual at every sample.
@@ -228,12 +228,10 @@ fn one_step(data: &Data, car: &SingleTrack, candidate: &Candidate) -> Vec<Stretc
     let stiffness = stiffest(candidate);
     let stretch = |stretch: &Window| -> Stretch {
         let segment = &data.segments[stretch.segment];
-        let series = smoothed(
-            (stretch.from..stretch.from + stretch.len)
-                .map(|k| corrected(segment, k, &candidate.corrections))
-                .collect(),
-            (SMOOTHING_S / segment.dt_s).round() as usize,
-        );
+        let series: Vec<(State, Input)> = (stretch.from..stretch.from + stretch.len)
+            .map(|k| corrected(segment, k, &candidate.corrections))
+            .collect();
+        let series = smoothed(&series, (SMOOTHING_S / segment.dt_s).round() as usize);
         let at = |k: usize| series[k - stretch.from];
         samples_of(data, stretch)
             .into_iter()
