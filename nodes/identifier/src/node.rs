@@ -5,9 +5,10 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use gripsight_bag::{Reassembler, identification_messages as messages};
+use gripsight_bag::Reassembler;
 use gripsight_identification::export::{Provenance, TireFiles};
 use gripsight_identification::{AcceptedSet, Config, FrictionPrior, Method, Outcome};
+use gripsight_identification_messages as messages;
 use gripsight_msgs::{
     FrictionPrior as FrictionMessage, ResidualModel as ModelMessage, StateSequence as SequenceMessage,
 };

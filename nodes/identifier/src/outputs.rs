@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
-use gripsight_bag::{encode, identification_messages as messages};
+use gripsight_bag::encode;
 use gripsight_identification::{Candidate, Config, IterationRecord, Outcome, RunKey};
+use gripsight_identification_messages as messages;
 use gripsight_msgs::standard::std_msgs::Header;
 use gripsight_msgs::{IdentificationProgress as Progress, PacejkaParams};
 use gripsight_runtime::{Node, Publisher, Qos};

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use gripsight_bag::identification_messages as messages;
 use gripsight_identification::{
     AcceptedSet, Candidate, Config, FrictionPrior, Identification, IdentificationError, Next, Outcome,
     ResidualModel, RunKey, Started,
 };
+use gripsight_identification_messages as messages;
 use gripsight_msgs::{IdentificationProgress as Progress, ResidualModel as ModelMessage};
 use gripsight_runtime::Subscription;
 use gripsight_signals::StateSequence;

@@ -5,11 +5,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use gripsight_bag::{Reassembler, identification_messages as messages};
+use gripsight_bag::Reassembler;
 use gripsight_identification::{
     Candidate, Config, IdentificationError, Method, ResidualKind, ResidualModel, RunKey, train_residual,
     vehicle_hash,
 };
+use gripsight_identification_messages as messages;
 use gripsight_msgs::{PacejkaParams, ResidualModel as ModelMessage, StateSequence as SequenceMessage};
 use gripsight_runtime::{Descriptor, Node, Publisher, Qos, vehicle_parameters};
 use gripsight_signals::StateSequence;

@@ -4,7 +4,6 @@
 //! - [`read_sequences`] and [`read_measurements`]: a bag's telemetry, topics found by type or by a [`TopicMap`].
 //! - [`Bag`]: its topics and its messages as bytes.
 //! - [`decode`], [`encode`]: messages and samples; [`sequence_to_messages`], [`Reassembler`]: sequences in chunks.
-//! - [`identification_messages`]: candidates, residual models and outcomes.
 //! - [`BagWriter`], [`recover`]: writing bags, and rewriting what is left of a damaged one.
 //! - [`info`]: what is in a bag; [`inject`]: a recorded bag with a known [`effect`].
 //! - [`from_cdr`], [`to_cdr`]: messages and bytes.
@@ -17,7 +16,6 @@ pub mod decode;
 pub mod effect;
 pub mod encode;
 mod error;
-pub mod identification_messages;
 mod info;
 mod inject;
 mod records;
