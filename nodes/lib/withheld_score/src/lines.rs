@@ -43,6 +43,10 @@ pub(crate) fn lines(scope: &[&Answer], own: &[&Answer], calibration: &Calibratio
     let coverage = Rate::count(&sizes, |s| s.covered);
     let shrinkage = median(scope.iter().filter_map(|a| a.shrinkage_over_oracle()).collect());
     let time_s = median(own.iter().map(|a| a.time_s).collect());
+    let perfect = match calibration.cases {
+        0 => "as a perfect forecaster's".to_owned(),
+        cases => format!("<= {:.3} (a perfect forecaster, {cases} cases)", calibration.perfect),
+    };
     let errors = sizes.iter().map(|s| ((s.value - s.truth) / s.truth).abs()).collect();
     vec![
         at_least("one effect: first name exact", Rate::count(&singles, |a| a.exact()), t.exact),
@@ -93,7 +97,7 @@ pub(crate) fn lines(scope: &[&Answer], own: &[&Answer], calibration: &Calibratio
         },
         figure(
             "calibration error of stated confidence",
-            format!("<= {:.3} (a perfect forecaster, {} cases)", calibration.perfect, calibration.cases),
+            perfect,
             calibration.error,
             calibration.error <= calibration.perfect,
         ),
