@@ -51,5 +51,5 @@ fn publish_results(node: &mut Node) -> Result<impl Future<Output = Result<(), Er
 }
 
 fn main() -> Result<(), Error> {
-    run("result_source", publish_results)
+    run("result_source", "Publishes parameter sets and pictures for the tests.\n", publish_results)
 }
