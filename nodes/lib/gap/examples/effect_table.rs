@@ -2,8 +2,8 @@
 //!
 //!     cargo run --release -p gripsight_gap --example effect_table -- [--car NAME] [--out FOLDER] [EFFECT...]
 //!
-//! Writes FOLDER/effects_CAR.csv and FOLDER/effects_CAR.md. The tires are taken from a reference drive without the effect. Seeds
-//! are those of development: thresholds were fixed on them.
+//! Writes FOLDER/effects_CAR.csv and FOLDER/effects_CAR.md. The tires are taken from a reference drive without the effect. No threshold
+//! was set on these seeds.
 
 #[path = "../tests/common/mod.rs"]
 mod common;

@@ -3,14 +3,18 @@
 //! "Sim" is the single-track model of `gripsight_vehicle` on given tires, "real" a recording. [`diagnose`] goes this way:
 //!
 //! 1. [`Recording`]: even stretches, channels, noise of each channel, laps, kinematic identities ([`Identity`]).
-//! 2. Windows of 0.5 s with free starts (`gripsight_identification::shooting`); tires retuned first, under a stated [`TireTrust`].
-//! 3. One Jacobian of tires and all candidates ranks the effects of the library ([`EffectId`]); the best are refitted jointly with the
-//!    tires from several starts; the model without them is refitted from the winner. A winner is taken if it is certain, large
-//!    enough to matter, and closes enough of what remains; then the search goes on from there.
+//! 2. Windows of 0.5 s with free starts (`gripsight_identification::shooting`). The null is retuned first: the tires, under a stated
+//!    [`TireTrust`], and what every car does a little of (load transfers, relaxation, combined slip, an uncertain yaw inertia), each within
+//!    what is usual for the car. Without that background every car shows a gap, and stand-ins are named for it.
+//! 3. One Jacobian of all candidates ranks the effects of the library ([`EffectId`]); the best are refitted jointly with the null's
+//!    parameters from several starts; the null is refitted from the winner. A winner is taken if it is certain, believable in size and
+//!    closes enough of what remains; then the search goes on from there. An effect that a later one explains is dropped, and each
+//!    that is left is put up against all others once more, with the rest of the model in place ([`Look`]).
 //! 4. Open-loop rollouts of 1 s on held-out blocks (or another bag): nominal, retuned, with the effects, with flexible terms on top
-//!    (the ceiling), against the noise. Little explained of what could be: "none of these".
+//!    (the ceiling), against the noise. What flexible terms still explain says whether a cause is missing: "none of these".
 //!
-//! Decisions rest on thresholds in one table (`select::thresholds`), fixed on development drives of the reference car.
+//! Intervals of sizes use blocks of 4 s as clusters and add a share of the size for errors of the model that all blocks share; that
+//! share, and all thresholds (`select::thresholds`, `verdict`), were fixed on development drives of the reference car.
 //!
 //! # Adding an effect
 //!

@@ -153,3 +153,54 @@ fn one_lap_hides_what_needs_a_second() {
     assert!(patch.reason.contains("lap") || patch.reason.contains("pass"), "{}", patch.reason);
     assert!(d.effects.iter().all(|e| e.name != "low_grip_patch"));
 }
+
+/// Every `step`-th sample of a recording but those from `from_s` to `to_s`.
+fn thinned(sequence: &StateSequence, step: usize, from_s: f32, to_s: f32) -> StateSequence {
+    let kept: Vec<usize> = (0..sequence.time_s.len())
+        .step_by(step)
+        .filter(|&k| sequence.time_s[k] < from_s || sequence.time_s[k] > to_s)
+        .collect();
+    let pick = |channel: &Vec<f32>| {
+        if channel.is_empty() { Vec::new() } else { kept.iter().map(|&k| channel[k]).collect() }
+    };
+    StateSequence {
+        time_s: pick(&sequence.time_s),
+        v_x_mps: pick(&sequence.v_x_mps),
+        v_y_mps: pick(&sequence.v_y_mps),
+        yaw_rate_radps: pick(&sequence.yaw_rate_radps),
+        steering_rad: pick(&sequence.steering_rad),
+        ..StateSequence::default()
+    }
+}
+
+#[test]
+fn short_slow_and_broken_recordings_get_an_answer() {
+    let recording = drive(&car(), Some("v_y_bias=0.3"), 20.0, 25).unwrap();
+    let mut nan = thinned(&recording, 1, 0.0, 0.0);
+    for k in (300..900).step_by(7) {
+        nan.v_y_mps[k] = f32::NAN;
+    }
+    for (name, sequence) in [
+        ("10 s", thinned(&recording, 1, 10.0, 99.0)),
+        ("20 Hz", thinned(&recording, 5, 0.0, 0.0)),
+        ("a gap of 3 s", thinned(&recording, 1, 8.0, 11.0)),
+        ("NaN", nan),
+    ] {
+        let vehicle = nominal(&car());
+        let only = ["v_y_bias".to_owned(), "steering_offset".to_owned()];
+        let request = Request {
+            sequence: &sequence,
+            held_out: None,
+            reference: None,
+            vehicle: &vehicle,
+            tires: None,
+            without: &[],
+            only: &only,
+        };
+        match diagnose(&request, &mut |_| {}) {
+            // An answer comes with what cannot be known.
+            Ok(d) => assert!(!d.reasons.is_empty() && !d.text().is_empty(), "{name}"),
+            Err(e) => assert!(!e.to_string().is_empty() && name == "NaN", "{name}: {e}"),
+        }
+    }
+}
