@@ -205,7 +205,7 @@ fn peak_friction(run: &Identification, tires: &PacejkaParameters) -> PerAxle<Pea
             let (low, high) = ((axle.d - half).max(0.0), axle.d + half);
             PeakFriction { value: axle.d, low, high, reached, from_prior: false }
         } else {
-            let from_prior = peak.from_prior(run.prior);
+            let from_prior = peak.is_the_priors(run.prior);
             let half = run.prior.filter(|_| from_prior).map_or(f64::NAN, |p| Estimate::Z90 * p.sigma);
             PeakFriction {
                 value: axle.d,

@@ -104,7 +104,7 @@ pub(crate) fn direct(
     if let Some(prior) = prior.filter(|_| !(peak.front.reached && peak.rear.reached)) {
         restart(&mut all, &found.parameters);
         for (offset, axle) in [(0, &peak.front), (4, &peak.rear)] {
-            if axle.from_prior(Some(prior)) {
+            if axle.is_the_priors(Some(prior)) {
                 all[offset + 2].free = false;
                 all[offset + 2].start = prior.mu;
                 all[offset + 1].start = C_PRIOR.mean;
@@ -134,8 +134,8 @@ pub(crate) fn direct(
     let fitted = tires_of(&found.parameters);
     Ok(Direct {
         tires: PacejkaParameters {
-            front: nearest(&points.front, &fitted.front, peak.front.from_prior(prior))?,
-            rear: nearest(&points.rear, &fitted.rear, peak.rear.from_prior(prior))?,
+            front: nearest(&points.front, &fitted.front, peak.front.is_the_priors(prior))?,
+            rear: nearest(&points.rear, &fitted.rear, peak.rear.is_the_priors(prior))?,
         },
         corrections: corrections_of(&found.parameters),
         nuisance: Nuisance { combined_slip: 0.0, ..allowed },

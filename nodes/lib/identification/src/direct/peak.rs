@@ -20,7 +20,7 @@ pub(crate) struct PeakEvidence {
 
 impl PeakEvidence {
     /// Whether D is the friction prior's: the data do not show the peak, and the prior is not below what they do show.
-    pub(crate) fn from_prior(&self, prior: Option<FrictionPrior>) -> bool {
+    pub(crate) fn is_the_priors(&self, prior: Option<FrictionPrior>) -> bool {
         !self.reached && prior.is_some_and(|p| p.mu >= self.height)
     }
 }
