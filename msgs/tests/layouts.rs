@@ -1,7 +1,5 @@
 //! The Foxglove and PlotJuggler layouts name topics and fields that the suite has.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
-
 use std::collections::BTreeSet;
 
 use gripsight_msgs::definition;
