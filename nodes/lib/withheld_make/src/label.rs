@@ -47,7 +47,7 @@ impl Kind {
     }
 }
 
-/// What the generator's own fit says of an effect in a drive; see [`crate::oracle`].
+/// What the generator's own fit says of an effect in a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OracleFit {
     /// Size over the detection limit (five standard errors).
