@@ -22,7 +22,8 @@ pub(crate) struct Flexible {
     a_x_mps2: f64,
     a_y_mps2: f64,
     yaw_acceleration: f64,
-    channel_size: Vec<f64>,
+    /// The channels of the recording that was fitted, with their sizes; another recording may have others.
+    channels: Vec<(Channel, f64)>,
 }
 
 impl Flexible {
@@ -45,15 +46,17 @@ impl Flexible {
             a_x_mps2: spread(&mut runs.iter().flat_map(|r| r.a_x_mps2.iter().copied())),
             a_y_mps2: (yaw * speed_mps).max(0.5),
             yaw_acceleration: (yaw * speed_mps / wheelbase_m).max(0.5),
-            channel_size: (0..recording.channels.len())
-                .map(|c| spread(&mut runs.iter().flat_map(|r| r.measured[c].iter().copied())))
+            channels: (recording.channels.iter().enumerate())
+                .map(|(c, channel)| {
+                    (*channel, spread(&mut runs.iter().flat_map(|r| r.measured[c].iter().copied())))
+                })
                 .collect(),
         }
     }
 
     /// How many parameters there are.
     pub(crate) fn parameters(&self) -> usize {
-        2 * FORCE_TERMS + SENSOR_TERMS * self.channel_size.len()
+        2 * FORCE_TERMS + SENSOR_TERMS * self.channels.len()
     }
 
     /// Additional lateral and yaw acceleration.
@@ -89,14 +92,13 @@ impl Flexible {
     }
 
     /// Additions to the signals: a constant, the yaw rate, the signal's own slope, the yaw acceleration.
-    pub(crate) fn sense<T: Real>(&self, p: &[T], channels: &[Channel], out: &mut Outputs<T>) {
+    pub(crate) fn sense<T: Real>(&self, p: &[T], out: &mut Outputs<T>) {
         let n = out.v_y_mps.len();
         let dt_s = out.dt_s;
         let rate: Vec<T> = out.yaw_rate_radps.clone();
         let acceleration = out.yaw_acceleration_radps2.clone();
-        for (c, channel) in channels.iter().enumerate() {
+        for (c, (channel, size)) in self.channels.iter().enumerate() {
             let own = &p[2 * FORCE_TERMS + SENSOR_TERMS * c..][..SENSOR_TERMS];
-            let size = self.channel_size[c];
             let series: &mut Vec<T> = match channel {
                 Channel::LateralVelocity => &mut out.v_y_mps,
                 Channel::LateralAcceleration => &mut out.a_y_mps2,
@@ -114,7 +116,7 @@ impl Flexible {
                 let turn = rate[k] * (self.speed_mps / self.a_y_mps2);
                 let twist = acceleration[k] / self.yaw_acceleration;
                 let more = own[0] + own[1] * turn + own[3] * twist;
-                series[k] += more * (0.1 * size) + own[2] * slope * 0.05;
+                series[k] += more * (0.1 * *size) + own[2] * slope * 0.05;
             }
         }
     }

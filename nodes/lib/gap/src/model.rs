@@ -172,7 +172,7 @@ impl<'a> ExtendedModel<'a> {
             effect.sense(values, &mut outputs);
         }
         if let Some(flexible) = &self.flexible {
-            flexible.sense(self.flexible_parameters(p), &self.recording.channels, &mut outputs);
+            flexible.sense(self.flexible_parameters(p), &mut outputs);
         }
         outputs
     }
