@@ -6,12 +6,12 @@ use std::time::Instant;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use gripsight_bag::{ReadReport, TopicMap, read_sequences};
-use gripsight_gap::{Diagnosis, EffectId, Request, Verdict, diagnose};
+use gripsight_bag::{Bag, BagWriter, ReadReport, TopicMap, encode, read_sequences};
+use gripsight_gap::{Diagnosis, EffectId, Prediction, Request, Verdict, diagnose};
 use gripsight_identification::export::read_tires;
 use gripsight_identification::vehicle_hash;
 use gripsight_report::{GapInput, Header, gap_page};
-use gripsight_signals::{StateSequence, WindowConfig};
+use gripsight_signals::{OdometrySample, StateSequence, WindowConfig};
 use gripsight_vehicle::VehicleParameters;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -54,6 +54,10 @@ pub(crate) struct DiagnoseArgs {
     /// Where the files go; made if it is not there.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Write the bag that is explained once more, with the predictions beside its topics: /gripsight/nominal/odom of the model as it came,
+    /// /gripsight/extended/odom of the model with the effects found (open-loop rollouts of half a second).
+    #[arg(long, value_name = "BAG")]
+    predictions: Option<PathBuf>,
 }
 
 fn names() -> String {
@@ -115,10 +119,50 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         let path = args.out.join(name);
         fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
     }
+    if let Some(path) = &args.predictions {
+        write_predictions(subject, path, sequence.start_stamp_ns, &result.series.predictions)
+            .with_context(|| format!("cannot write {}", path.display()))?;
+    }
     print!("{}", result.text());
     let names: Vec<&str> = files.iter().map(|f| f.0).collect();
     println!("files      {} ({})", args.out.display(), names.join(", "));
     Ok(outcome(&result))
+}
+
+/// Copies a bag, with what the models predicted in between, in the order of time.
+fn write_predictions(
+    bag: &Path,
+    out: &Path,
+    start_stamp_ns: i64,
+    predictions: &[Prediction],
+) -> anyhow::Result<()> {
+    const TOPICS: [&str; 2] = ["/gripsight/nominal/odom", "/gripsight/extended/odom"];
+    let bag = Bag::open(bag)?;
+    let mut writer = BagWriter::create(out)?;
+    let mut left = predictions.iter().peekable();
+    let stamp_ns = |p: &Prediction| start_stamp_ns + (p.time_s * 1e9).round() as i64;
+    let write = |writer: &mut BagWriter, p: &Prediction| -> anyhow::Result<()> {
+        for (topic, model) in TOPICS.into_iter().zip([1, 2]) {
+            let sample = OdometrySample {
+                stamp_ns: stamp_ns(p),
+                v_x_mps: p.v_x_mps,
+                v_y_mps: p.v_y_mps[model],
+                yaw_rate_radps: p.yaw_rate_radps[model],
+                ..OdometrySample::default()
+            };
+            writer.write(topic, sample.stamp_ns, &encode::odometry(&sample))?;
+        }
+        Ok(())
+    };
+    for message in bag.messages() {
+        let message = message?;
+        while let Some(p) = left.next_if(|p| stamp_ns(p) <= message.log_time.cast_signed()) {
+            write(&mut writer, p)?;
+        }
+        writer.copy(&message)?;
+    }
+    left.try_for_each(|p| write(&mut writer, p))?;
+    Ok(writer.finish()?)
 }
 
 fn outcome(result: &Diagnosis) -> Outcome {

@@ -24,7 +24,7 @@
 //! }
 //!
 //! fn main() -> Result<(), Error> {
-//!     run("relay", relay)
+//!     run("relay", "Passes on each n-th odometry message.", relay)
 //! }
 //! ```
 //!

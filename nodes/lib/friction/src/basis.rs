@@ -71,7 +71,7 @@ impl Basis {
 
     /// mu = p . B and the standard deviation of the mixture, for `p` in the order of the classes.
     #[must_use]
-    pub fn expect(&self, p: &[f64]) -> Prior {
+    pub fn prior(&self, p: &[f64]) -> Prior {
         let pairs = || p.iter().zip(&self.classes);
         let mu: f64 = pairs().map(|(p, c)| p * c.mu).sum();
         let second: f64 = pairs().map(|(p, c)| p * (c.sigma * c.sigma + c.mu * c.mu)).sum();
@@ -96,7 +96,7 @@ mod tests {
     #[test]
     fn one_class_gives_its_own_value_and_spread() {
         let basis = Basis::builtin().unwrap();
-        let got = basis.expect(&[0.0, 1.0, 0.0, 0.0, 0.0]);
+        let got = basis.prior(&[0.0, 1.0, 0.0, 0.0, 0.0]);
         assert_relative_eq!(got.mu, 0.60, epsilon = 1e-12);
         assert_relative_eq!(got.sigma, 0.10, epsilon = 1e-9);
     }
@@ -108,7 +108,7 @@ mod tests {
             let basis = Basis::builtin().unwrap();
             let total: f64 = w.iter().sum();
             let p: Vec<f64> = w.iter().map(|x| x / total).collect();
-            let got = basis.expect(&p);
+            let got = basis.prior(&p);
             let within: f64 = p.iter().zip(&basis.classes).map(|(p, c)| p * c.sigma * c.sigma).sum();
             let between: f64 = p.iter().zip(&basis.classes).map(|(p, c)| p * (c.mu - got.mu).powi(2)).sum();
             prop_assert!((got.sigma.powi(2) - within - between).abs() < 1e-12);

@@ -274,7 +274,7 @@ impl FrictionEstimator {
             return seen(self.refuse(stamp, reason, None));
         }
         let p = self.filter.update(&self.settings.filter, &reading.p, motion.distance_m).to_vec();
-        let Prior { mu, sigma } = self.basis.expect(&p);
+        let Prior { mu, sigma } = self.basis.prior(&p);
         seen(Estimate {
             stamp_ns: stamp,
             source: Source::Camera,

@@ -48,13 +48,13 @@ fn main() -> anyhow::Result<()> {
         names.extend(EffectId::ALL.iter().map(|e| sized(e.name()).unwrap_or(e.name()).to_owned()));
     }
     let car = CarParameters::by_name(&car_name)?;
-    let reference = drive(&car, None, DURATION_S, 11)?;
+    let reference = drive(&car, None, DURATION_S, 51)?;
     let vehicle = nominal(&car);
     let mut csv = String::from(
         "car,effect,true_size,verdict,named,confused_with,size,low,high,closed,nominal,retuned,after,ceiling,confidence,time_s\n",
     );
     for name in &names {
-        let recording = match drive(&car, (name != "none").then_some(name.as_str()), DURATION_S, 12) {
+        let recording = match drive(&car, (name != "none").then_some(name.as_str()), DURATION_S, 52) {
             Ok(r) => r,
             Err(e) => {
                 println!("{name}: {e}");

@@ -99,8 +99,9 @@ fn explain(
     progress("scoring on held-out data");
     let models = Models { nominal: &nominal, null: &null, state: &state, last: &last };
     let budget = Budget::of(&engine, other.as_ref(), &windows, &models);
-    let (verdict, mut reasons) = decide(&budget, &last, &state, &costs);
-    reasons.extend(crate::noise::caveat(&recording));
+    let caveat = crate::noise::caveat(&recording);
+    let (verdict, mut reasons) = decide(&budget, &last, &state, &costs, crate::noise::is_known(&recording));
+    reasons.extend(caveat);
     let blocks = &windows.training.block;
     let left = costs.last().copied().unwrap_or(f64::NAN);
     let mut effects = rank(&evidence, &last, &state, &budget, blocks, left);

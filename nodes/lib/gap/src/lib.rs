@@ -79,8 +79,8 @@ pub use evaluate::Estimate;
 pub use extended_file::ExtendedModelFile;
 pub use identities::Identity;
 pub use outcome::{
-    Comparison, DetectionLimit, Diagnosis, EffectParameter, GapBudget, Invisible, Look, Place, RankedEffect,
-    Series, TirePair, Verdict, Where,
+    Comparison, DetectionLimit, Diagnosis, EffectParameter, GapBudget, Invisible, Look, Place, Prediction,
+    RankedEffect, Series, TirePair, Verdict, Where,
 };
 pub use recording::{Channel, Recording};
 pub use terms::{Axle, Axles, Car, Moment, Motion, Outputs};

@@ -33,11 +33,20 @@ pub(crate) fn is_clear(runs: &[Run], c: usize) -> bool {
     noise > LEAST_SHARE * spread(runs, c, true) && of(halved.iter().map(Vec::as_slice)) < WHITE_RATIO * noise
 }
 
+/// The scored channels whose noise cannot be told.
+fn unclear(recording: &Recording) -> Vec<&'static str> {
+    let scored = (0..recording.channels.len()).filter(|&c| recording.channels[c].scored());
+    scored.filter(|&c| !is_clear(&recording.runs, c)).map(|c| recording.channels[c].name()).collect()
+}
+
+/// Whether the noise of most channels can be told, so that errors can be read against it.
+pub(crate) fn is_known(recording: &Recording) -> bool {
+    2 * unclear(recording).len() <= recording.channels.iter().filter(|c| c.scored()).count()
+}
+
 /// A sentence where the noise cannot be told from the signals.
 pub(crate) fn caveat(recording: &Recording) -> Option<String> {
-    let scored = (0..recording.channels.len()).filter(|&c| recording.channels[c].scored());
-    let names: Vec<&str> =
-        scored.filter(|&c| !is_clear(&recording.runs, c)).map(|c| recording.channels[c].name()).collect();
+    let names = unclear(recording);
     (!names.is_empty()).then(|| {
         format!(
             "noise cannot be told from these signals ({}: smoothed, interpolated or simulated): the floor is a lower bound, and so is every share of the gap; read the errors against each other, not against 1",

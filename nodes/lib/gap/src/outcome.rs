@@ -192,6 +192,19 @@ pub struct Look {
     pub compared: Vec<Comparison>,
 }
 
+/// An instant as measured and as predicted by open-loop rollouts of half a second.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prediction {
+    /// Time since the recording's first sample.
+    pub time_s: f64,
+    /// Forward speed, which is the model's input.
+    pub v_x_mps: f64,
+    /// Lateral velocity: measured, of the nominal model, of the model with the effects.
+    pub v_y_mps: [f64; 3],
+    /// Yaw rate: measured, of the nominal model, of the model with the effects.
+    pub yaw_rate_radps: [f64; 3],
+}
+
 /// Points of the pictures.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Series {
@@ -199,8 +212,10 @@ pub struct Series {
     pub tire_curves: [Vec<[f64; 3]>; 2],
     /// Largest slip angle driven, front and rear, rad.
     pub slip_driven_rad: [f64; 2],
-    /// The five seconds with the largest errors: time, then for v_y and yaw rate (measured, nominal, after).
-    pub worst: Vec<[f64; 7]>,
+    /// The five seconds with the largest errors.
+    pub worst: Vec<Prediction>,
+    /// The whole recording, where it could be used.
+    pub predictions: Vec<Prediction>,
     /// Squared error per degree of freedom over speed (m/s) and lateral acceleration (m/s2): (speed, a_y, chi2).
     pub heat: Vec<[f64; 3]>,
     /// Longitudinal and lateral acceleration (m/s2) of the recording.

@@ -1,10 +1,10 @@
 //! The points of the report's pictures.
 
-use gripsight_identification::shooting::Rollout;
+use gripsight_identification::shooting::{Rollout, Window};
 
 use crate::engine::{Engine, Score, State};
 use crate::evaluate::{by_block, mean};
-use crate::outcome::Series;
+use crate::outcome::{Prediction, Series};
 use crate::place::heat;
 use crate::windows::{Windows, of_length};
 
@@ -22,10 +22,12 @@ pub(crate) fn series(
     scored: &Windows,
 ) -> Series {
     let slip_driven_rad = slips(engine, null, all);
+    let predictions = predictions(engine, nominal, state, all, nominal_score);
     Series {
         tire_curves: curves(null, state, slip_driven_rad),
         slip_driven_rad,
-        worst: worst(engine, nominal, state, all, nominal_score),
+        worst: worst(engine, &predictions, all, nominal_score),
+        predictions,
         heat: heat(engine, nominal, all, nominal_score),
         g_g: g_g(engine),
         horizon: horizon(engine, nominal, null, state, scored),
@@ -63,43 +65,52 @@ fn curves(null: &State, state: &State, driven_rad: [f64; 2]) -> [Vec<[f64; 3]>; 
     [axle(&without.front, &with.front, driven_rad[0]), axle(&without.rear, &with.rear, driven_rad[1])]
 }
 
+/// What the nominal model and the model with the effects predict over all windows, beside what was measured. Every window starts anew
+/// from its best state.
+fn predictions(
+    engine: &Engine<'_>,
+    nominal: &[f64],
+    state: &State,
+    all: &Windows,
+    nominal_score: &Score,
+) -> Vec<Prediction> {
+    let extended = engine.score(&state.effects, None, &state.parameters, all);
+    let models = [engine.model(&[], None), engine.model(&state.effects, None)];
+    let channels = engine.recording.channels.len();
+    let [mut before, mut after] = [Vec::new(), Vec::new()];
+    let mut out = Vec::new();
+    for (i, w) in all.windows.iter().enumerate() {
+        models[0].rollout(nominal, nominal_score.starts[i], w, &mut before);
+        models[1].rollout(&state.parameters, extended.starts[i], w, &mut after);
+        let run = &engine.recording.runs[w.segment];
+        out.extend(before.chunks(channels).zip(after.chunks(channels)).enumerate().map(|(k, (a, b))| {
+            let at = w.from + k;
+            Prediction {
+                time_s: run.time_s(at),
+                v_x_mps: run.v_x_mps[at],
+                v_y_mps: [run.measured[0][at], a[0], b[0]],
+                yaw_rate_radps: [run.measured[1][at], a[1], b[1]],
+            }
+        }));
+    }
+    out
+}
+
 /// The stretch of windows with the largest errors of the nominal model.
-fn worst(engine: &Engine<'_>, nominal: &[f64], state: &State, all: &Windows, score: &Score) -> Vec<[f64; 7]> {
-    let dt_s = engine.recording.dt_s();
+fn worst(engine: &Engine<'_>, predictions: &[Prediction], all: &Windows, score: &Score) -> Vec<Prediction> {
     let Some(first) = all.windows.first() else { return Vec::new() };
-    let count = ((WORST_S / (first.len as f64 * dt_s)).round() as usize).clamp(1, all.windows.len());
+    let count = ((WORST_S / (first.len as f64 * engine.recording.dt_s())).round() as usize)
+        .clamp(1, all.windows.len());
     let best = (0..=all.windows.len() - count)
         .max_by(|&a, &b| {
             let sum = |i: usize| score.squares[i..i + count].iter().sum::<f64>();
             sum(a).total_cmp(&sum(b))
         })
         .unwrap_or(0);
-    let chosen = Windows {
-        windows: all.windows[best..best + count].to_vec(),
-        block: all.block[best..best + count].to_vec(),
-    };
-    let runs = [(&[][..], nominal), (&state.effects[..], &state.parameters[..])].map(|(effects, p)| {
-        let fitted = engine.score(effects, None, p, &chosen);
-        let model = engine.model(effects, None);
-        let mut out = Vec::new();
-        for (w, start) in chosen.windows.iter().zip(&fitted.starts) {
-            let mut predicted = Vec::new();
-            model.rollout(p, *start, w, &mut predicted);
-            let channels = model.channels();
-            out.extend(predicted.chunks(channels).map(|row| [row[0], row[1]]));
-        }
-        out
-    });
-    let mut out = Vec::new();
-    for w in &chosen.windows {
-        let run = &engine.recording.runs[w.segment];
-        for k in w.from..w.from + w.len {
-            let i = out.len();
-            let (Some(a), Some(b)) = (runs[0].get(i), runs[1].get(i)) else { return out };
-            out.push([run.time_s(k), run.measured[0][k], a[0], b[0], run.measured[1][k], a[1], b[1]]);
-        }
-    }
-    out
+    let samples = |windows: &[Window]| windows.iter().map(|w| w.len).sum::<usize>();
+    let from = samples(&all.windows[..best]);
+    let to = from + samples(&all.windows[best..best + count]);
+    predictions.get(from..to).map(<[_]>::to_vec).unwrap_or_default()
 }
 
 fn g_g(engine: &Engine<'_>) -> Vec<[f64; 2]> {

@@ -12,6 +12,8 @@ use crate::sizes::sizes;
 const WORSE: f64 = 1.2;
 /// Share of what the retuned tires leave that the named effects must explain, where they leave more than is usual.
 const LEAST_EXPLAINED: f64 = 0.65;
+/// The same of what could be explained at all, where the noise is not known.
+const LEAST_OF_POSSIBLE: f64 = 0.5;
 /// Share of what is left that flexible terms explain from which something is missing in the model; less is scatter.
 const EXPLAINABLE: f64 = 0.2;
 /// Mean squared held-out error over noise that is more than the usual imperfection of the model.
@@ -22,7 +24,13 @@ const HUGE_COST: f64 = 4.0;
 const RETUNE_EXCESS: f64 = 0.1;
 
 /// The verdict, with its reasons.
-pub(crate) fn decide(budget: &Budget, last: &Round, state: &State, costs: &[f64]) -> (Verdict, Vec<String>) {
+pub(crate) fn decide(
+    budget: &Budget,
+    last: &Round,
+    state: &State,
+    costs: &[f64],
+    noise_is_known: bool,
+) -> (Verdict, Vec<String>) {
     let (nominal, retuned, after) = (mean(&budget.nominal), budget.retuned(), budget.after());
     let ceiling = mean(&budget.ceiling).min(after);
     let mut reasons = vec![format!(
@@ -55,7 +63,13 @@ pub(crate) fn decide(budget: &Budget, last: &Round, state: &State, costs: &[f64]
         100.0 * closed,
         100.0 * explainable
     ));
-    if (!small || after > LARGE_ERROR) && closed < LEAST_EXPLAINED && explainable > EXPLAINABLE {
+    // Where the noise cannot be told, only what flexible terms reach says what is possible at all.
+    let enough = if noise_is_known {
+        closed > LEAST_EXPLAINED || explainable < EXPLAINABLE
+    } else {
+        retuned - after > LEAST_OF_POSSIBLE * (retuned - ceiling)
+    };
+    if (!small || after > LARGE_ERROR) && !enough {
         reasons.push("that is too little: the cause is not, or not only, in the library".to_owned());
         return (Verdict::NoneOfThese, reasons);
     }

@@ -6,8 +6,8 @@
 use std::collections::BTreeMap;
 
 use gripsight_gap::{
-    Diagnosis, EffectParameter, Estimate, GapBudget, Identity, Invisible, Place, RankedEffect, Series,
-    TirePair, Verdict, Where,
+    Diagnosis, EffectParameter, Estimate, GapBudget, Identity, Invisible, Place, Prediction, RankedEffect,
+    Series, TirePair, Verdict, Where,
 };
 use gripsight_report::{GapInput, Header, gap_page};
 use gripsight_signals::DataHealth;
@@ -107,8 +107,14 @@ fn diagnosis() -> Diagnosis {
             slip_driven_rad: [0.16, 0.12],
             worst: (0..500)
                 .map(|k| (k as f64 * 0.01, waves(k)))
-                .map(|(t, (v, r))| [t, v, 1.3 * v, 1.05 * v, r, 0.8 * r, 0.98 * r])
+                .map(|(time_s, (v, r))| Prediction {
+                    time_s,
+                    v_x_mps: 3.0,
+                    v_y_mps: [v, 1.3 * v, 1.05 * v],
+                    yaw_rate_radps: [r, 0.8 * r, 0.98 * r],
+                })
                 .collect(),
+            predictions: Vec::new(),
             heat: (0..64)
                 .filter(|k| (k / 8 + k % 8) < 10)
                 .map(|k| (f64::from(k / 8), f64::from(k % 8)))

@@ -32,11 +32,13 @@ pub fn gap_page(input: &GapInput<'_>) -> Result<String, ReportError> {
     let (heat, scale) = pictures::heat(d);
     let drawn = !d.series.horizon.is_empty();
     let body = html! {
+        (section("Data", true, &tables::data(d, input.data_notes)))
         (section("How large the gap is", true, &tables::budget(d)))
         (section("Effects, ranked", true, &tables::effects(d)))
         @if drawn {
             (section("Front tires", false, &figure(&front, "")?))
             (section("Rear tires", false, &figure(&rear, "")?))
+            (section("What the effects had done to the tires", true, &tables::tires(d)))
             (section("Lateral velocity, worst seconds", false, &figure(&v_y, "")?))
             (section("Yaw rate, worst seconds", false, &figure(&yaw_rate, "Rollouts start anew from the best state at every window.")?))
             (section("Error over speed and lateral acceleration", false, &html! { (figure(&heat, "")?) (scale) }))
@@ -49,7 +51,6 @@ pub fn gap_page(input: &GapInput<'_>) -> Result<String, ReportError> {
         (section("Why", false, &list(&d.reasons, "")))
         (section("What these signals cannot show", false, &facts_table(&tables::invisible(d))))
         (section("Kinematics", false, &facts_table(&tables::identities(d))))
-        (section("Data", false, &tables::data(d, input.data_notes)))
     };
     let tone = match d.verdict {
         Verdict::Effects | Verdict::TireRetuneOnly | Verdict::NoGap => Tone::Good,

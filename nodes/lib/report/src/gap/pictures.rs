@@ -1,6 +1,6 @@
 //! The pictures of a diagnosis.
 
-use gripsight_gap::{Diagnosis, Place};
+use gripsight_gap::{Diagnosis, Place, Prediction};
 use maud::{Markup, html};
 
 use crate::chart::heat as heat_color;
@@ -37,20 +37,22 @@ fn force_axis() -> Axis {
 
 /// Lateral velocity and yaw rate over the worst seconds.
 pub(super) fn worst_seconds(d: &Diagnosis) -> [Chart; 2] {
-    let points = &d.series.worst;
-    let picture = |title: &str, unit: &str, first: usize| {
-        let line = |role: Role, name: &str, column: usize| Layer::Line {
+    let picture = |title: &str, unit: &str, of: fn(&Prediction) -> [f64; 3]| {
+        let line = |role: Role, name: &str, which: usize| Layer::Line {
             role,
             name: name.into(),
-            points: points.iter().map(|p| (p[0], p[column])).collect(),
+            points: d.series.worst.iter().map(|p| (p.time_s, of(p)[which])).collect(),
         };
         Chart::new(title, Axis::new("time / s"), Axis::new(unit))
             .sized(460, 220)
-            .with(line(Role::Nominal, "model as it came", first + 1))
-            .with(line(Role::Measured, "measured", first))
-            .with(line(Role::Identified, "with the effects", first + 2))
+            .with(line(Role::Nominal, "model as it came", 1))
+            .with(line(Role::Measured, "measured", 0))
+            .with(line(Role::Identified, "with the effects", 2))
     };
-    [picture("lateral velocity", "v_y / (m/s)", 1), picture("yaw rate", "yaw rate / (rad/s)", 4)]
+    [
+        picture("lateral velocity", "v_y / (m/s)", |p| p.v_y_mps),
+        picture("yaw rate", "yaw rate / (rad/s)", |p| p.yaw_rate_radps),
+    ]
 }
 
 /// Error over speed and lateral acceleration, and its scale.

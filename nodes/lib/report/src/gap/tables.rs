@@ -75,6 +75,42 @@ pub(super) fn effects(d: &Diagnosis) -> Markup {
     }
 }
 
+/// The tires fitted without any effect, and together with those named.
+pub(super) fn tires(d: &Diagnosis) -> Markup {
+    let pair = &d.tires;
+    let axles = [
+        ("front", &pair.without_effect.front, &pair.with_effect.front),
+        ("rear", &pair.without_effect.rear, &pair.with_effect.rear),
+    ];
+    let change = |a: f64, b: f64| {
+        let percent = 100.0 * (b - a) / a;
+        if percent.is_finite() { format!("{percent:+.1} %") } else { String::new() }
+    };
+    html! {
+        table {
+            thead { tr { th { "Axle" } th { "" } th { "B" } th { "C" } th { "D" } th { "E" } th { "stiffness / load (B C D)" } } }
+            tbody {
+                @for (axle, without, with) in axles {
+                    @for (what, t) in [("without effect", without), ("with the effects named", with)] {
+                        tr {
+                            td { (axle) }
+                            td { (what) }
+                            @for v in [t.b, t.c, t.d, t.e, t.normalized_stiffness()] { td { (significant(v, 3)) } }
+                        }
+                    }
+                    tr {
+                        td { (axle) }
+                        td { "change" }
+                        @for (a, b) in [(without.b, with.b), (without.c, with.c), (without.d, with.d)] { td { (change(a, b)) } }
+                        td {}
+                        td { (change(without.normalized_stiffness(), with.normalized_stiffness())) }
+                    }
+                }
+            }
+        }
+    }
+}
+
 fn closes(fraction: &Estimate) -> String {
     if fraction.low < fraction.high {
         format!("{} ({} %)", percent(fraction.value), interval(100.0 * fraction.low, 100.0 * fraction.high))
