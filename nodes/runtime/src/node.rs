@@ -44,7 +44,7 @@ pub struct Node {
     stop: watch::Sender<bool>,
     // Dropped in this order: the node, which ends its spinner, then the context.
     ros: Arc<Mutex<ros2_client::Node>>,
-    _context: Context,
+    context: Context,
 }
 
 impl Node {
@@ -82,7 +82,7 @@ impl Node {
             tasks: JoinSet::new(),
             stop: watch::Sender::new(false),
             ros: Arc::new(Mutex::new(ros)),
-            _context: context,
+            context,
         };
         tokio::spawn(async move {
             if let Err(error) = spinner.spin().await {
@@ -255,7 +255,8 @@ impl Node {
         };
         let serving = {
             let mut ros = self.ros.lock().unwrap_or_else(PoisonError::into_inner);
-            services.serve(&mut ros, &self.identity, environment.service_mapping)?
+            let participant = self.context.domain_participant();
+            services.serve(&mut ros, &self.identity, environment.service_mapping, &participant)?
         };
         self.spawn(serving);
         self.spawn(async move {

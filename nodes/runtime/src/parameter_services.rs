@@ -5,10 +5,12 @@
 use std::collections::BTreeSet;
 use std::future::Future;
 use std::sync::Arc;
+use std::time::Duration;
 
 use futures::StreamExt;
 use gripsight_msgs::standard::rcl_interfaces as rcl;
-use ros2_client::{Message, Name, Server, ServiceMapping, ServiceTypeName};
+use ros2_client::{Message, Name, RmwRequestId, Server, ServiceMapping, ServiceTypeName};
+use rustdds::DomainParticipant;
 use serde::{Deserialize, Serialize};
 use tokio::sync::mpsc;
 
@@ -17,6 +19,11 @@ use crate::clock::Clock;
 use crate::names::Identity;
 use crate::parameters::ParameterStore;
 use crate::qos::Qos;
+
+/// Time that a client's reader of replies has to be discovered.
+const DISCOVERY_TIME: Duration = Duration::from_secs(1);
+/// Bytes of a client's GUID that both mappings of services leave as they are; they tell participants apart.
+const KNOWN_OF_CLIENT: usize = 8;
 
 macro_rules! service_messages {
     ($($name:ident { $($field:ident: $type:ty),* })*) => {$(
@@ -59,8 +66,9 @@ impl ParameterServices {
         node: &mut ros2_client::Node,
         identity: &Identity,
         mapping: ServiceMapping,
+        participant: &DomainParticipant,
     ) -> Result<impl Future<Output = ()> + use<>, Error> {
-        let mut factory = Factory { node, identity, mapping };
+        let mut factory = Factory { node, identity, mapping, participant };
         let get = factory.server::<NamesRequest, GetResponse>("get_parameters", "GetParameters")?;
         let types =
             factory.server::<NamesRequest, TypesResponse>("get_parameter_types", "GetParameterTypes")?;
@@ -152,10 +160,11 @@ struct Factory<'a> {
     node: &'a mut ros2_client::Node,
     identity: &'a Identity,
     mapping: ServiceMapping,
+    participant: &'a DomainParticipant,
 }
 
 impl Factory<'_> {
-    fn server<Q, A>(&mut self, name: &str, type_name: &str) -> Result<Server<Q, A>, Error>
+    fn server<Q, A>(&mut self, name: &str, type_name: &str) -> Result<Service<Q, A>, Error>
     where
         Q: Message + Clone + 'static,
         A: Message + 'static,
@@ -164,22 +173,61 @@ impl Factory<'_> {
         let ros_name = Name::parse(&name).map_err(|error| Error::create(&name, error))?;
         let type_name = ServiceTypeName::new("rcl_interfaces", type_name);
         let qos = Qos::reliable(10).profile();
-        self.node
+        let server = self
+            .node
             .create_server(self.mapping, &ros_name, &type_name, qos.clone(), qos)
-            .map_err(|error| Error::create(format!("service {name}"), error))
+            .map_err(|error| Error::create(format!("service {name}"), error))?;
+        let participant = self.participant.clone();
+        Ok(Service { server, replies: Replies { participant, topic: format!("rr{name}Reply") } })
     }
 }
 
-async fn answer<Q, A>(server: Server<Q, A>, respond: impl Fn(Q) -> A)
+struct Service<Q, A>
+where
+    Q: Message,
+    A: Message,
+{
+    server: Server<Q, A>,
+    replies: Replies,
+}
+
+/// The topic on which a service replies, by its DDS name.
+struct Replies {
+    participant: DomainParticipant,
+    topic: String,
+}
+
+impl Replies {
+    /// Waits until the participant of `client` reads the replies. A request may arrive before its
+    /// client's reader is discovered; a reply sent then is lost, and the client waits forever.
+    async fn are_read_by(&self, client: &RmwRequestId) {
+        let (client, _) = client.writer_gid.as_bytes().split_at(KNOWN_OF_CLIENT);
+        let is_read = || {
+            self.participant.discovered_readers().iter().any(|reader| {
+                *reader.subscription_topic_data.topic_name() == self.topic
+                    && reader.reader_proxy.remote_reader_guid.to_bytes().starts_with(client)
+            })
+        };
+        let end = tokio::time::Instant::now() + DISCOVERY_TIME;
+        while !is_read() && tokio::time::Instant::now() < end {
+            // Longer than the writer takes from the reader's discovery to sending to it.
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    }
+}
+
+async fn answer<Q, A>(service: Service<Q, A>, respond: impl Fn(Q) -> A)
 where
     Q: Message + 'static,
     A: Message + 'static,
 {
+    let Service { server, replies } = service;
     let mut requests = server.receive_request_stream();
     while let Some(request) = requests.next().await {
         match request {
             Ok((id, request)) => {
                 let response = respond(request);
+                replies.are_read_by(&id).await;
                 if let Err(error) = server.async_send_response(id, response).await {
                     tracing::warn!("cannot answer a parameter request: {error}");
                 }
