@@ -3,46 +3,22 @@
 //! `cargo run --release --example read_reference_camera -- FIRST_SEED > readings.csv`: 40 roads each. Seeds from 5000 are for
 //! development, from 9000 for the model card.
 
-use std::path::Path;
+#[path = "../tests/reference_roads/mod.rs"]
+mod reference_roads;
 
-use gripsight_friction::{
-    Basis, Frame, FrameData, FrictionEstimator, OnnxRuntime, RawPicture, Settings, find_library, find_model,
-};
-use gripsight_reference_car::RoadCamera;
-
-/// The reference car's own camera, and a larger one.
-const SIDES: [u32; 2] = [RoadCamera::SIDE_PX, 256];
+use reference_roads::{SIDES, estimator, read};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let first: u64 = std::env::args().nth(1).ok_or("usage: read_reference_camera FIRST_SEED")?.parse()?;
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let network = OnnxRuntime::load(&find_library(None, here)?, &find_model(None, here)?)?;
-    let mut estimator =
-        FrictionEstimator::new(Settings::default(), Basis::builtin()?, Some(Box::new(network)));
+    let mut estimator = estimator()?;
     println!("side,true_mu,seed,valid,reason,mu,sigma,p_dry,p_wet,p_water,p_snow,p_ice");
     for side in SIDES {
-        for tenths in 1..=9 {
-            let true_mu = f64::from(tenths) / 10.0;
-            for seed in first..first + 40 {
-                let picture = RoadCamera::new(seed).picture(side, 3.0, true_mu);
-                let raw = RawPicture {
-                    width: side,
-                    height: side,
-                    step: side * 3,
-                    encoding: "rgb8",
-                    big_endian: false,
-                    data: &picture.data,
-                };
-                let got = estimator.read_single(&Frame { stamp_ns: 0, data: FrameData::Raw(raw) });
+        for true_mu in (1..=9).map(|tenths| f64::from(tenths) / 10.0) {
+            for (seed, got) in (first..).zip(read(&mut estimator, side, true_mu, first..first + 40)) {
                 let p: Vec<String> = got.probability.iter().map(|p| format!("{p:.4}")).collect();
-                let reason = got.reason.map_or("", |r| r.as_str());
-                println!(
-                    "{side},{true_mu:.1},{seed},{},{reason},{:.4},{:.4},{}",
-                    got.valid(),
-                    got.mu,
-                    got.sigma,
-                    p.join(",")
-                );
+                let (reason, p) = (got.reason.map_or("", |r| r.as_str()), p.join(","));
+                let (valid, mu, sigma) = (got.valid(), got.mu, got.sigma);
+                println!("{side},{true_mu:.1},{seed},{valid},{reason},{mu:.4},{sigma:.4},{p}");
             }
         }
     }

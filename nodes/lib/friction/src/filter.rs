@@ -3,14 +3,11 @@
 //! A picture counts by the new road that it shows, not by the time that passed: at a standstill p hardly moves, and after a
 //! change of surface it follows within the same stretch of road at any speed.
 
-use serde::Deserialize;
-
 /// Pictures at the start that are averaged with equal weights.
 const PLAIN_PICTURES: u32 = 5;
 
 /// Settings of the filter.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FilterSettings {
     /// Distance over which an old picture's weight falls to 1/e, metres.
     pub length_m: f64,

@@ -1,8 +1,6 @@
 //! Is this a picture at all? Statistics of the resized crop, cheap enough for every frame.
 
-use serde::Deserialize;
-
-use crate::estimator::Reason;
+use crate::estimate::Reason;
 use crate::picture::RgbPicture;
 
 /// What is measured on the crop at the network's input size.
@@ -92,8 +90,7 @@ fn structure(luma: &[i32], width: usize) -> f64 {
 }
 
 /// Limits on [`QualityStatistics`]; set on validation pictures so that hardly any honest one is refused.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct QualityLimits {
     /// Mean luma below which the picture is dark.
     pub least_mean: f64,

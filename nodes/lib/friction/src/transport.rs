@@ -1,8 +1,6 @@
 //! Did a fresh picture arrive, and is the camera still looking?
 
-use serde::Deserialize;
-
-use crate::estimator::Reason;
+use crate::estimate::Reason;
 use crate::picture::{FrameData, RawPicture};
 
 /// A stamp that goes back further than this means that the clock was set back (a bag started again); less is one late
@@ -10,8 +8,7 @@ use crate::picture::{FrameData, RawPicture};
 const CLOCK_JUMP_NS: i64 = 1_000_000_000;
 
 /// Limits of the transport gate.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TransportLimits {
     /// Age above which a picture is stale, seconds.
     pub most_age_s: f64,
