@@ -158,15 +158,7 @@ impl Diagnoser<'_> {
     ) -> Result<Diagnosis, String> {
         let (vehicle, without) = (Arc::clone(&self.vehicle), self.without.get());
         let work = move || -> Result<Diagnosis, GapError> {
-            let request = Request {
-                sequence: &sequence,
-                held_out: None,
-                reference: None,
-                vehicle: &vehicle,
-                tires,
-                without: &without,
-                only: &[],
-            };
+            let request = Request { tires, without: &without, ..Request::new(&sequence, &vehicle) };
             diagnose(&request, &mut |step| tracing::debug!("{step}"))
         };
         match tokio::task::spawn_blocking(work).await {

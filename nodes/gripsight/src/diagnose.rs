@@ -7,7 +7,7 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use clap::Args;
 use gripsight_bag::{Bag, BagWriter, ReadReport, TopicMap, encode, read_sequences};
-use gripsight_gap::{Diagnosis, EffectId, Prediction, Request, Verdict, diagnose};
+use gripsight_gap::{Diagnosis, EffectId, ExtendedModelFile, Prediction, Request, Verdict, diagnose};
 use gripsight_identification::export::read_tires;
 use gripsight_identification::vehicle_hash;
 use gripsight_report::{GapInput, Header, gap_page};
@@ -42,6 +42,9 @@ pub(crate) struct DiagnoseArgs {
     /// The tires of the model: pacejka.yaml or <car>_pacejka.txt; trusted to a few percent.
     #[arg(long, value_name = "FILE", conflicts_with = "bag2")]
     pacejka: Option<PathBuf>,
+    /// The model to start from: extended_model.yaml of an earlier diagnosis, its effects in place at their sizes; what is left is diagnosed.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["bag2", "pacejka"])]
+    extended_model: Option<PathBuf>,
     /// Leave an effect out of the library. May be repeated.
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
@@ -78,6 +81,7 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     let topics = args.topics.as_deref().map(TopicMap::read).transpose()?.unwrap_or_default();
     let vehicle = vehicle(args.vehicle.as_deref())?;
     let tires = args.pacejka.as_deref().map(tires).transpose()?;
+    let model = args.extended_model.as_deref().map(extended_model).transpose()?;
     // The drive that is explained is the later one; the earlier one says what the tires were.
     let subject = args.bag2.as_deref().unwrap_or(&args.bag);
     let (sequence, report) = read(subject, &topics)?;
@@ -87,13 +91,13 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     let spinner =
         ProgressBar::new_spinner().with_style(ProgressStyle::with_template("{spinner} {msg} {elapsed}")?);
     let request = Request {
-        sequence: &sequence,
         held_out: held_out.as_ref().map(|h| &h.0),
         reference: reference.as_ref().map(|r| &r.0),
-        vehicle: &vehicle,
         tires,
+        model: model.as_ref(),
         without: &args.without,
         only: &args.only,
+        ..Request::new(&sequence, &vehicle)
     };
     let result = diagnose(&request, &mut |stage| {
         spinner.set_message(stage.to_owned());
@@ -113,7 +117,7 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         ("timing.json", serde_json::to_string_pretty(&timing)? + "\n"),
     ];
     if result.verdict != Verdict::NotIdentifiable {
-        files.push(("extended_model.yaml", result.extended_model().to_yaml()?));
+        files.push(("extended_model.yaml", result.extended_model.to_yaml()?));
     }
     for (name, text) in &files {
         let path = args.out.join(name);
@@ -183,6 +187,12 @@ pub(crate) fn vehicle(path: Option<&Path>) -> anyhow::Result<VehicleParameters> 
 pub(crate) fn tires(path: &Path) -> anyhow::Result<gripsight_vehicle::PacejkaParameters> {
     let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
     read_tires(&text).with_context(|| format!("cannot use {}", path.display()))
+}
+
+/// The extended model of a file.
+pub(crate) fn extended_model(path: &Path) -> anyhow::Result<ExtendedModelFile> {
+    let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    ExtendedModelFile::from_yaml(&text).with_context(|| format!("cannot use {}", path.display()))
 }
 
 /// The longest recorded sequence, or everything in one.

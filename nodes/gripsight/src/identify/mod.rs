@@ -12,6 +12,7 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use gripsight_bag::{ReadReport, TopicMap, read_sequences};
+use gripsight_gap::{ExtendedModelFile, without_effects};
 use gripsight_identification::export::{Provenance, TireFiles};
 use gripsight_identification::{
     self as identification, Config, FrictionPrior, Method, ResidualKind, identify,
@@ -22,6 +23,7 @@ use gripsight_vehicle::VehicleParameters;
 
 use crate::Outcome;
 use crate::camera::{NetworkArgs, prior_of_bag};
+use crate::diagnose::extended_model;
 use crate::invocation::invocation;
 use progress::{Progress, Timing};
 
@@ -69,6 +71,9 @@ pub(crate) struct IdentifyArgs {
     /// An accepted identification.json of the same car: where this run starts, and what it has to beat.
     #[arg(long, value_name = "FILE")]
     previous: Option<PathBuf>,
+    /// extended_model.yaml of a diagnosis: its effects are taken out of the signals before the tires are identified.
+    #[arg(long, value_name = "FILE")]
+    extended_model: Option<PathBuf>,
     /// Only the recorded state sequence with this id.
     #[arg(long, value_name = "ID")]
     sequence: Option<u64>,
@@ -163,7 +168,15 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
     let topics = args.topics.as_deref().map(TopicMap::read).transpose()?.unwrap_or_default();
     let vehicle = args.vehicle()?;
     let mut previous = args.previous.as_deref().map(previous::read).transpose()?;
-    let (sequences, report) = args.sequences(&topics)?;
+    let model = args.extended_model.as_deref().map(extended_model).transpose()?;
+    let (mut sequences, report) = args.sequences(&topics)?;
+    if let Some(model) = &model {
+        for sequence in &mut sequences {
+            *sequence = without_effects(sequence, &vehicle, model)
+                .with_context(|| format!("cannot take the effects out of {}", args.bag.display()))?;
+        }
+    }
+    let notes = data_notes(&report, model.as_ref());
     timing.reading_s = start.elapsed().as_secs_f64();
     let prior = args.prior(&topics)?;
     timing.camera_s = start.elapsed().as_secs_f64() - timing.reading_s;
@@ -178,7 +191,7 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
                 .with_context(|| format!("cannot identify the tires from {}", args.bag.display()))?;
         timing.add(&stages.finish());
         let writing = Instant::now();
-        let files = write(args, &vehicle, &report, sequence, &result)?;
+        let files = write(args, &vehicle, &notes, sequence, &result)?;
         timing.writing_s += writing.elapsed().as_secs_f64();
         previous = result.accepted_set().or(previous);
         last = Some((result, files));
@@ -202,7 +215,7 @@ fn car_name(args: &IdentifyArgs, vehicle: &VehicleParameters) -> String {
 fn write(
     args: &IdentifyArgs,
     vehicle: &VehicleParameters,
-    report: &ReadReport,
+    notes: &[String],
     sequence: &StateSequence,
     result: &identification::Outcome,
 ) -> anyhow::Result<Vec<PathBuf>> {
@@ -232,7 +245,7 @@ fn write(
         outcome: result,
         header: &header,
         truth: truth.as_ref(),
-        data_notes: &data_notes(report),
+        data_notes: notes,
     })?;
     let texts =
         [("identification.json", serde_json::to_string_pretty(result)? + "\n"), ("report.html", page)];
@@ -254,7 +267,7 @@ fn write(
 }
 
 /// What reading the bag met, in sentences.
-fn data_notes(report: &ReadReport) -> Vec<String> {
+fn data_notes(report: &ReadReport, model: Option<&ExtendedModelFile>) -> Vec<String> {
     let counted = [
         (
             report.without_content,
@@ -266,5 +279,9 @@ fn data_notes(report: &ReadReport) -> Vec<String> {
     let counted = counted.into_iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}"));
     let recorded =
         report.recorded_sequences.iter().map(|topic| format!("state sequences recorded on {topic}"));
-    report.truncated.clone().into_iter().chain(recorded).chain(counted).collect()
+    let corrected = model.map(|m| {
+        let names: Vec<&str> = m.effects.keys().map(String::as_str).collect();
+        format!("taken out of the signals before the tires were identified: {}", names.join(", "))
+    });
+    report.truncated.clone().into_iter().chain(recorded).chain(counted).chain(corrected).collect()
 }

@@ -46,13 +46,11 @@ impl Case {
     /// Diagnoses it; `only` names the effects to consider, the whole library where there is none.
     pub(super) fn diagnose(&self, only: &[String]) -> Result<Diagnosis, GapError> {
         let request = Request {
-            sequence: &self.sequence,
             held_out: Some(&self.held_out),
-            reference: None,
-            vehicle: &self.vehicle,
             tires: self.tires,
             without: if only.is_empty() { &self.without } else { &[] },
             only,
+            ..Request::new(&self.sequence, &self.vehicle)
         };
         diagnose(&request, &mut |_| {})
     }

@@ -16,17 +16,9 @@ fn diagnosis(c: &mut Criterion) {
     let mut group = c.benchmark_group("diagnose");
     group.sample_size(10).warm_up_time(Duration::from_secs(1)).measurement_time(Duration::from_secs(30));
     for (duration_s, candidates) in [(15.0, 34), (30.0, 34), (60.0, 34), (60.0, 16), (60.0, 4)] {
-        let Ok(recording) = drive(&car, Some("tire_relaxation=0.45"), duration_s, 31) else { continue };
+        let Ok(recording) = drive(&car, &["tire_relaxation=0.45"], duration_s, 31) else { continue };
         let only: Vec<String> = EffectId::ALL.iter().take(candidates).map(|e| e.name().to_owned()).collect();
-        let request = Request {
-            sequence: &recording,
-            held_out: None,
-            reference: None,
-            vehicle: &vehicle,
-            tires: None,
-            without: &[],
-            only: &only,
-        };
+        let request = Request { only: &only, ..Request::new(&recording, &vehicle) };
         let name = BenchmarkId::new(format!("{duration_s} s"), candidates);
         group.bench_function(name, |b| b.iter(|| diagnose(&request, &mut |_| {})));
     }

@@ -48,13 +48,14 @@ fn main() -> anyhow::Result<()> {
         names.extend(EffectId::ALL.iter().map(|e| sized(e.name()).unwrap_or(e.name()).to_owned()));
     }
     let car = CarParameters::by_name(&car_name)?;
-    let reference = drive(&car, None, DURATION_S, 51)?;
+    let reference = drive(&car, &[], DURATION_S, 51)?;
     let vehicle = nominal(&car);
     let mut csv = String::from(
         "car,effect,true_size,verdict,named,confused_with,size,low,high,closed,nominal,retuned,after,ceiling,confidence,time_s\n",
     );
     for name in &names {
-        let recording = match drive(&car, (name != "none").then_some(name.as_str()), DURATION_S, 52) {
+        let effects: &[&str] = if name == "none" { &[] } else { &[name] };
+        let recording = match drive(&car, effects, DURATION_S, 52) {
             Ok(r) => r,
             Err(e) => {
                 println!("{name}: {e}");
@@ -62,15 +63,7 @@ fn main() -> anyhow::Result<()> {
             }
         };
         let started = Instant::now();
-        let request = Request {
-            sequence: &recording,
-            held_out: None,
-            reference: Some(&reference),
-            vehicle: &vehicle,
-            tires: None,
-            without: &[],
-            only: &[],
-        };
+        let request = Request { reference: Some(&reference), ..Request::new(&recording, &vehicle) };
         match diagnose(&request, &mut |_| {}) {
             Ok(d) => {
                 let line = row(&car, name, &d, started.elapsed().as_secs_f64());

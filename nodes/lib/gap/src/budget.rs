@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::effects::EffectId;
-use crate::engine::{Engine, State};
+use crate::engine::{Engine, Nominal, State};
 use crate::evaluate::{Estimate, bootstrap, by_block, interval, mean, of_picked};
 use crate::flexible::Flexible;
 use crate::outcome::GapBudget;
@@ -29,7 +29,7 @@ pub(crate) struct Budget {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Models<'m> {
     /// Parameters as they came.
-    pub(crate) nominal: &'m [f64],
+    pub(crate) nominal: &'m Nominal,
     /// Tires retuned.
     pub(crate) null: &'m State,
     /// With the effects taken.
@@ -98,7 +98,7 @@ impl Budget {
             _ => Estimate::default(),
         };
         Self {
-            nominal: blocks(&[], None, nominal),
+            nominal: blocks(&nominal.effects, None, &nominal.parameters),
             ceiling: blocks(&state.effects, Some(&flexible), &ceiling),
             steps,
             // By construction of the noise's figure the floor is 1.

@@ -13,7 +13,7 @@ use crate::select::reweigh;
 use crate::usable::{Usable, cannot_tell, refused, usable};
 use crate::verdict::{decide, looks, rank};
 use crate::windows::{Windows, split};
-use crate::{GapError, pictures, place};
+use crate::{ExtendedModelFile, GapError, pictures, place};
 
 /// What is diagnosed, and with what.
 #[derive(Debug, Clone)]
@@ -28,10 +28,34 @@ pub struct Request<'a> {
     pub vehicle: &'a VehicleParameters,
     /// The tires as the model has them, and trusted to a few percent; `None`: identified from the training blocks.
     pub tires: Option<PacejkaParameters>,
+    /// The model to start from, in place of `tires`: an earlier diagnosis, its effects in place at their sizes.
+    pub model: Option<&'a ExtendedModelFile>,
     /// Names of effects to leave out of the library.
     pub without: &'a [String],
     /// The only effects to consider, by name; empty: the whole library.
     pub only: &'a [String],
+}
+
+impl<'a> Request<'a> {
+    /// Diagnoses a recording by the whole library, with nothing known but the car.
+    #[must_use]
+    pub fn new(sequence: &'a StateSequence, vehicle: &'a VehicleParameters) -> Self {
+        Self {
+            sequence,
+            held_out: None,
+            reference: None,
+            vehicle,
+            tires: None,
+            model: None,
+            without: &[],
+            only: &[],
+        }
+    }
+
+    /// The tires handed over, if any.
+    pub(crate) fn given_tires(&self) -> Option<PacejkaParameters> {
+        self.model.map(|m| m.tires).or(self.tires)
+    }
 }
 
 /// Where fits without any knowledge of the tires start: (B, C, D, E) front and rear.
@@ -66,7 +90,7 @@ fn explain(
     let Usable { recording, windows } = usable;
     let other = request.held_out.map(Recording::new).transpose()?;
     progress("fitting the tires");
-    let (tires, trust) = match (request.tires, request.reference) {
+    let (tires, trust) = match (request.given_tires(), request.reference) {
         (Some(tires), _) => (tires, TireTrust::file()),
         (None, Some(reference)) => {
             let reference = Recording::new(reference)?;
@@ -77,7 +101,10 @@ fn explain(
     };
     let (library, invisible) = library(request, &recording, trust != TireTrust::free())?;
     let mut engine = Engine::new(&recording, request.vehicle, tires, trust);
-    let nominal = engine.nominal_parameters();
+    if let Some(model) = request.model {
+        (engine.held, engine.usual) = model.parameters()?;
+    }
+    let nominal = engine.nominal_model();
     // The search works on a bounded number of windows, the final fit on all.
     let search_windows = windows.training.thinned(SEARCH_WINDOWS);
     let blank = engine.blank();
@@ -114,7 +141,7 @@ fn explain(
     let scored_windows =
         if windows.held_out.windows.is_empty() { &windows.training } else { &windows.held_out };
     let on_all = split(&recording, false).training;
-    let nominal_score = engine.score(&[], None, &nominal, &on_all);
+    let nominal_score = engine.score(&nominal.effects, None, &nominal.parameters, &on_all);
     let detection_limits = last
         .screening
         .candidates
@@ -140,6 +167,10 @@ fn explain(
         gap: budget.stated(&recording),
         gap_closed_fraction: budget.closed,
         tires: TirePair { without_effect: null.tires(), with_effect: state.tires() },
+        extended_model: ExtendedModelFile::of(
+            &engine,
+            if verdict == Verdict::Effects { &state } else { &null },
+        ),
         data_health,
         looks: looks(&engine, &evidence, &last, &state),
         search_costs: costs,
@@ -177,12 +208,7 @@ fn library(
     recording: &Recording,
     trusted: bool,
 ) -> Result<(Vec<EffectId>, Vec<Invisible>), GapError> {
-    let known = |name: &String| {
-        EffectId::by_name(name).ok_or_else(|| GapError::UnknownEffect {
-            name: name.clone(),
-            known: EffectId::ALL.iter().map(|e| e.name()).collect::<Vec<_>>().join(", "),
-        })
-    };
+    let known = |name: &String| EffectId::known(name);
     let without = request.without.iter().map(known).collect::<Result<Vec<_>, _>>()?;
     let only = request.only.iter().map(known).collect::<Result<Vec<_>, _>>()?;
     let met = |need: Need| match need {

@@ -70,9 +70,11 @@ pub(crate) const ROBUST_K: f64 = 3.0;
 pub(crate) struct State {
     /// Effects that are claimed.
     pub(crate) named: Vec<EffectId>,
-    /// All of the model: the background that is not claimed, then those that are.
+    /// All of the model: the background that is not claimed, what was handed over, then those that are claimed.
     pub(crate) effects: Vec<EffectId>,
     pub(crate) parameters: Vec<f64>,
+    /// Places of the parameters that its fit moved.
+    pub(crate) free: Vec<usize>,
     pub(crate) starts: Vec<[f64; 2]>,
     pub(crate) cost: f64,
     pub(crate) window_costs: Vec<f64>,
@@ -104,12 +106,26 @@ impl State {
     }
 }
 
+/// The model as it was handed over.
+#[derive(Debug, Clone)]
+pub(crate) struct Nominal {
+    pub(crate) effects: Vec<EffectId>,
+    pub(crate) parameters: Vec<f64>,
+}
+
+/// Effects with their parameters, as they are fitted.
+pub(crate) type Sized = Vec<(EffectId, Vec<f64>)>;
+
 /// What all fits share.
 #[derive(Debug, Clone)]
 pub(crate) struct Engine<'a> {
     pub(crate) recording: &'a Recording,
     pub(crate) vehicle: &'a VehicleParameters,
     pub(crate) nominal: PacejkaParameters,
+    /// Effects that the nominal model has: held at their sizes until they are claimed.
+    pub(crate) held: Sized,
+    /// What the nominal model has of the background.
+    pub(crate) usual: Sized,
     pub(crate) trust: TireTrust,
     /// Weights of the channels: what residuals are divided by when fitting.
     pub(crate) sigma: Vec<f64>,
@@ -130,6 +146,11 @@ fn substep_s(vehicle: &VehicleParameters, tires: &PacejkaParameters, v_x_mps: f6
     (SHARE / lateral.max(yaw)).clamp(SHORTEST_S, LONGEST_S)
 }
 
+/// Values at which an effect is absent.
+fn null_values(effect: EffectId) -> Vec<f64> {
+    effect.spec().parameters.iter().map(|p| p.null).collect()
+}
+
 impl<'a> Engine<'a> {
     pub(crate) fn new(
         recording: &'a Recording,
@@ -142,6 +163,8 @@ impl<'a> Engine<'a> {
             recording,
             vehicle,
             nominal,
+            held: Vec::new(),
+            usual: Vec::new(),
             trust,
             sigma: recording.weights.clone(),
             size_place: ((vehicle.wheelbase_m() / 0.32).ln() / (3.0_f64 / 0.32).ln()).clamp(0.0, 1.0),
@@ -154,15 +177,42 @@ impl<'a> Engine<'a> {
         spec.size[0] * (spec.size[1] / spec.size[0]).powf(self.size_place)
     }
 
-    /// The nominal model on the tires handed over.
-    pub(crate) fn nominal_parameters(&self) -> Vec<f64> {
+    /// Tires and hold of the nominal model.
+    fn nominal_base(&self) -> Vec<f64> {
         let mut p = tires_to_parameters(&self.nominal).to_vec();
         p.push(0.5 * self.recording.dt_s());
         p
     }
 
+    /// The nominal model as it was handed over: its effects and all its parameters.
+    pub(crate) fn nominal_model(&self) -> Nominal {
+        let mut parameters = self.nominal_base();
+        let given = || self.usual.iter().chain(&self.held);
+        parameters.extend(given().flat_map(|(_, own)| own));
+        Nominal { effects: given().map(|(e, _)| *e).collect(), parameters }
+    }
+
+    /// The parameters with which the nominal model has an effect; at their null where it has not.
+    pub(crate) fn start_values(&self, effect: EffectId) -> Vec<f64> {
+        let given = self.held.iter().chain(&self.usual).find(|(e, _)| *e == effect);
+        given.map_or_else(|| null_values(effect), |(_, own)| own.clone())
+    }
+
+    /// The parameters that stand for the effect's absence among the claims: those of the nominal model where it is held, else its null.
+    pub(crate) fn absent(&self, effect: EffectId) -> Vec<f64> {
+        let held = self.held.iter().find(|(e, _)| *e == effect);
+        held.map_or_else(|| null_values(effect), |(_, own)| own.clone())
+    }
+
+    fn holds(&self, effect: EffectId) -> bool {
+        self.held.iter().any(|(e, _)| *e == effect)
+    }
+
     /// How much of an effect this car may well have without anything being the matter; `None` of those that are no background.
     pub(crate) fn usual(&self, effect: EffectId) -> Option<f64> {
+        if self.holds(effect) {
+            return None;
+        }
         let place = BACKGROUND.iter().position(|e| *e == effect)?;
         let size = self.size(&effect.spec().parameters[0]);
         let scale = match effect {
@@ -173,26 +223,28 @@ impl<'a> Engine<'a> {
         Some(USUAL[place] * scale)
     }
 
-    /// The nominal model with a background of nothing.
+    /// The nominal model, with its background in place to be fitted.
     pub(crate) fn blank(&self) -> Vec<f64> {
-        let mut p = self.nominal_parameters();
-        p.extend(BACKGROUND.iter().flat_map(|e| Self::null_values(*e)));
+        let mut p = self.nominal_base();
+        p.extend(self.layout(&[]).into_iter().flat_map(|e| self.start_values(e)));
         p
     }
 
     /// The effects of a model that claims `named`, in the order of its parameters.
     pub(crate) fn layout(&self, named: &[EffectId]) -> Vec<EffectId> {
-        let silent = BACKGROUND.iter().filter(|e| !named.contains(e));
-        silent.chain(named).copied().collect()
+        let background = BACKGROUND.into_iter().filter(|e| !self.holds(*e));
+        let held = self.held.iter().map(|(e, _)| *e);
+        let silent = background.chain(held).filter(|e| !named.contains(e));
+        silent.chain(named.iter().copied()).collect()
     }
 
-    /// The parameters of a state, for a model that claims `named`; what the state lacks is at its null.
+    /// The parameters of a state, for a model that claims `named`; what the state lacks is absent.
     pub(crate) fn carry(&self, state: &State, named: &[EffectId]) -> Vec<f64> {
         let mut values = state.parameters[..BASE].to_vec();
         for effect in self.layout(named) {
             match state.of(effect) {
                 Some(own) => values.extend(own),
-                None => values.extend(Self::null_values(effect)),
+                None => values.extend(self.absent(effect)),
             }
         }
         values
@@ -212,11 +264,6 @@ impl<'a> Engine<'a> {
         let mut model = ExtendedModel::new(self.recording, self.vehicle, effects, self.substep_s);
         model.flexible = flexible.cloned();
         model
-    }
-
-    /// Values at the null of every effect.
-    pub(crate) fn null_values(effect: EffectId) -> Vec<f64> {
-        effect.spec().parameters.iter().map(|p| p.null).collect()
     }
 
     /// Bounds and priors of all parameters of a model; `values` is where a fit starts.
@@ -259,10 +306,16 @@ impl<'a> Engine<'a> {
             prior: None,
         });
         for effect in effects {
-            let usual = self.usual(*effect).filter(|_| !named.contains(effect));
-            for spec in effect.spec().parameters {
+            let claimed = named.contains(effect);
+            let usual = self.usual(*effect).filter(|_| !claimed);
+            for (spec, absent) in effect.spec().parameters.iter().zip(self.absent(*effect)) {
                 let size = self.size(spec);
                 let place = out.len();
+                if self.holds(*effect) && !claimed {
+                    let start = values[place];
+                    out.push(Parameter { start, low: start, high: start, free: false, prior: None });
+                    continue;
+                }
                 if let Some(usual) = usual {
                     out.push(Parameter {
                         start: values[place],
@@ -278,7 +331,7 @@ impl<'a> Engine<'a> {
                     low: spec.null + spec.range[0] * size,
                     high: spec.null + spec.range[1] * size,
                     free: true,
-                    prior: Some(Prior { mean: spec.null, sigma: PRIOR_SIZES * size }),
+                    prior: Some(Prior { mean: absent, sigma: PRIOR_SIZES * size }),
                 });
             }
         }
@@ -316,6 +369,7 @@ impl<'a> Engine<'a> {
             named: named.to_vec(),
             effects,
             parameters: fit.parameters.clone(),
+            free: (0..parameters.len()).filter(|&j| parameters[j].free).collect(),
             starts: fit.starts.clone(),
             cost: fit.linearization.cost,
             window_costs: fit.linearization.window_costs.clone(),

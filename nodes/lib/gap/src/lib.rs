@@ -44,6 +44,7 @@
 //! must leave the nominal model exactly as it was. If its derivative vanishes there, say `flat_at_null` and give `starts`.
 
 mod budget;
+mod correct;
 mod diagnose;
 mod effects;
 mod engine;
@@ -71,6 +72,7 @@ mod usable;
 mod verdict;
 mod windows;
 
+pub use correct::without_effects;
 pub use diagnose::{Request, diagnose};
 pub use effects::{Effect, EffectId, EffectSpec, Need, ParameterSpec, Reported};
 pub use engine::TireTrust;

@@ -6,7 +6,7 @@ use gripsight_signals::DataHealth;
 use gripsight_vehicle::PacejkaParameters;
 use serde::Serialize;
 
-use crate::{Estimate, Identity};
+use crate::{Estimate, ExtendedModelFile, Identity};
 
 /// What a diagnosis comes to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -246,6 +246,8 @@ pub struct Diagnosis {
     pub gap: GapBudget,
     /// (retuned - after)/(retuned - noise floor); unknown (`null`) where the share of an effect is.
     pub gap_closed_fraction: Estimate,
+    /// The model that the verdict names: what a later diagnosis or identification can start from.
+    pub extended_model: ExtendedModelFile,
     /// Tires with and without the effects; unknown (`null`) where the data cannot tell and none were given.
     pub tires: TirePair,
     /// Rates, gaps, jitter, frozen channels.

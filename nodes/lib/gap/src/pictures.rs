@@ -2,7 +2,7 @@
 
 use gripsight_identification::shooting::{Rollout, Window};
 
-use crate::engine::{Engine, Score, State};
+use crate::engine::{Engine, Nominal, Score, State};
 use crate::evaluate::{by_block, mean};
 use crate::outcome::{Prediction, Series};
 use crate::place::heat;
@@ -14,7 +14,7 @@ const HORIZONS_S: [f64; 5] = [0.1, 0.2, 0.5, 1.0, 2.0];
 
 pub(crate) fn series(
     engine: &Engine<'_>,
-    nominal: &[f64],
+    nominal: &Nominal,
     null: &State,
     state: &State,
     all: &Windows,
@@ -69,18 +69,18 @@ fn curves(null: &State, state: &State, driven_rad: [f64; 2]) -> [Vec<[f64; 3]>; 
 /// from its best state.
 fn predictions(
     engine: &Engine<'_>,
-    nominal: &[f64],
+    nominal: &Nominal,
     state: &State,
     all: &Windows,
     nominal_score: &Score,
 ) -> Vec<Prediction> {
     let extended = engine.score(&state.effects, None, &state.parameters, all);
-    let models = [engine.model(&[], None), engine.model(&state.effects, None)];
+    let models = [engine.model(&nominal.effects, None), engine.model(&state.effects, None)];
     let channels = engine.recording.channels.len();
     let [mut before, mut after] = [Vec::new(), Vec::new()];
     let mut out = Vec::new();
     for (i, w) in all.windows.iter().enumerate() {
-        models[0].rollout(nominal, nominal_score.starts[i], w, &mut before);
+        models[0].rollout(&nominal.parameters, nominal_score.starts[i], w, &mut before);
         models[1].rollout(&state.parameters, extended.starts[i], w, &mut after);
         let run = &engine.recording.runs[w.segment];
         out.extend(before.chunks(channels).zip(after.chunks(channels)).enumerate().map(|(k, (a, b))| {
@@ -124,7 +124,13 @@ fn g_g(engine: &Engine<'_>) -> Vec<[f64; 2]> {
     all.iter().step_by((all.len() / POINTS).max(1)).copied().collect()
 }
 
-fn horizon(engine: &Engine<'_>, nominal: &[f64], null: &State, state: &State, on: &Windows) -> Vec<[f64; 4]> {
+fn horizon(
+    engine: &Engine<'_>,
+    nominal: &Nominal,
+    null: &State,
+    state: &State,
+    on: &Windows,
+) -> Vec<[f64; 4]> {
     HORIZONS_S
         .into_iter()
         .filter_map(|h| {
@@ -137,7 +143,7 @@ fn horizon(engine: &Engine<'_>, nominal: &[f64], null: &State, state: &State, on
             };
             Some([
                 h,
-                error(&[], nominal),
+                error(&nominal.effects, &nominal.parameters),
                 error(&null.effects, &null.parameters),
                 error(&state.effects, &state.parameters),
             ])

@@ -2,8 +2,7 @@
 
 use gripsight_identification::shooting::Rollout;
 
-use crate::engine::{Engine, Score};
-use crate::model::tires_from_parameters;
+use crate::engine::{Engine, Nominal, Score};
 use crate::outcome::{Place, Where};
 use crate::recording::Channel;
 use crate::smooth::quantile;
@@ -21,11 +20,11 @@ struct Sample {
 const BINS: usize = 6;
 
 /// Sorts the errors of a model on windows.
-pub(crate) fn places(engine: &Engine<'_>, values: &[f64], windows: &Windows, score: &Score) -> Where {
+pub(crate) fn places(engine: &Engine<'_>, nominal: &Nominal, windows: &Windows, score: &Score) -> Where {
     let recording = engine.recording;
     let scored: Vec<usize> =
         (0..recording.channels.len()).filter(|&c| recording.channels[c].scored()).collect();
-    let samples = samples(engine, values, windows, score, &scored);
+    let samples = samples(engine, nominal, windows, score, &scored);
     let total: f64 = samples.iter().flat_map(|s| s.squares.iter()).sum::<f64>().max(1e-12);
     let mut out = Where::default();
     let n = samples.len().max(1) as f64;
@@ -62,17 +61,22 @@ pub(crate) fn places(engine: &Engine<'_>, values: &[f64], windows: &Windows, sco
         out.track_position = binned(5, "m");
     }
     out.time = binned(6, "s");
-    out.frequency = frequency(engine, values, windows, score);
+    out.frequency = frequency(engine, nominal, windows, score);
     out
 }
 
 /// Mean squared error over speed and lateral acceleration.
-pub(crate) fn heat(places: &Engine<'_>, values: &[f64], windows: &Windows, score: &Score) -> Vec<[f64; 3]> {
+pub(crate) fn heat(
+    places: &Engine<'_>,
+    nominal: &Nominal,
+    windows: &Windows,
+    score: &Score,
+) -> Vec<[f64; 3]> {
     const CELLS: usize = 8;
     let recording = places.recording;
     let scored: Vec<usize> =
         (0..recording.channels.len()).filter(|&c| recording.channels[c].scored()).collect();
-    let samples = samples(places, values, windows, score, &scored);
+    let samples = samples(places, nominal, windows, score, &scored);
     let top = |k: usize| samples.iter().map(|s| s.values[k]).fold(1e-6, f64::max);
     let (v_top, a_top) = (top(0), top(1));
     let mut cells = vec![(0.0, 0usize); CELLS * CELLS];
@@ -95,21 +99,21 @@ pub(crate) fn heat(places: &Engine<'_>, values: &[f64], windows: &Windows, score
 
 fn samples(
     engine: &Engine<'_>,
-    values: &[f64],
+    nominal: &Nominal,
     windows: &Windows,
     score: &Score,
     scored: &[usize],
 ) -> Vec<Sample> {
     let recording = engine.recording;
-    let model = engine.model(&[], None);
-    let nominal = gripsight_vehicle::SingleTrack::new(engine.vehicle, &tires_from_parameters(&values[..8]));
+    let model = engine.model(&nominal.effects, None);
+    let car = gripsight_vehicle::SingleTrack::new(engine.vehicle, &engine.nominal);
     let (l_f, l_r) = (engine.vehicle.l_f_m, engine.vehicle.l_r_m);
     let channels = recording.channels.len();
     let (mut predicted, mut measured) = (Vec::new(), Vec::new());
     let mut out = Vec::new();
     for (window, start) in windows.windows.iter().zip(&score.starts) {
         let run = &recording.runs[window.segment];
-        model.rollout(values, *start, window, &mut predicted);
+        model.rollout(&nominal.parameters, *start, window, &mut predicted);
         model.measured(window, &mut measured);
         for k in 0..window.len {
             let at = window.from + k;
@@ -120,7 +124,7 @@ fn samples(
                 gripsight_vehicle::State { v_y_mps: run.smooth[0][at], yaw_rate_radps: run.smooth[1][at] };
             let input =
                 gripsight_vehicle::Input { v_x_mps: run.v_x_mps[at], steering_rad: run.steering_rad[at] };
-            let (front, rear) = nominal.slip_angles_rad(&state, &input);
+            let (front, rear) = car.slip_angles_rad(&state, &input);
             let next = (at + 1).min(run.len() - 1);
             out.push(Sample {
                 values: [
@@ -170,17 +174,17 @@ fn bins(samples: &[Sample], k: usize, unit: &'static str, total: f64, channels: 
 }
 
 /// Power of the errors of v_y and yaw rate by frequency, over the power of white noise.
-fn frequency(engine: &Engine<'_>, values: &[f64], windows: &Windows, score: &Score) -> Vec<Place> {
+fn frequency(engine: &Engine<'_>, nominal: &Nominal, windows: &Windows, score: &Score) -> Vec<Place> {
     const EDGES_HZ: [f64; 6] = [0.0, 1.5, 3.5, 6.5, 12.5, 50.0];
     let recording = engine.recording;
-    let model = engine.model(&[], None);
+    let model = engine.model(&nominal.effects, None);
     let channels = recording.channels.len();
     let dt_s = recording.dt_s();
     let (mut predicted, mut measured) = (Vec::new(), Vec::new());
     let mut power = [0.0; EDGES_HZ.len() - 1];
     let mut count = [0.0; EDGES_HZ.len() - 1];
     for (window, start) in windows.windows.iter().zip(&score.starts) {
-        model.rollout(values, *start, window, &mut predicted);
+        model.rollout(&nominal.parameters, *start, window, &mut predicted);
         model.measured(window, &mut measured);
         for c in [Channel::LateralVelocity, Channel::YawRate] {
             let Some(place) = recording.channels.iter().position(|&x| x == c) else { continue };

@@ -45,7 +45,7 @@ pub(crate) fn screen(
     let named: Vec<EffectId> = state.named.iter().chain(candidates).copied().collect();
     let mut values = state.parameters.clone();
     for effect in &effects[state.effects.len()..] {
-        values.extend(Engine::null_values(*effect));
+        values.extend(engine.absent(*effect));
     }
     // A candidate that is part of the background keeps the background's prior here, and is let go where it is looked at.
     let quiet: Vec<EffectId> =
@@ -57,7 +57,7 @@ pub(crate) fn screen(
     let row_of = |j: usize| free.iter().position(|&f| f == j);
     // What is on its bound does not move along.
     let bound = |j: &usize| state.fit.as_ref().is_some_and(|f| f.on_bound.contains(j));
-    let own: Vec<usize> = (0..state.parameters.len()).filter(|j| !bound(j)).filter_map(row_of).collect();
+    let own: Vec<usize> = state.free.iter().copied().filter(|j| !bound(j)).filter_map(row_of).collect();
     let place = |effect: EffectId| {
         let before: usize =
             effects.iter().take_while(|e| **e != effect).map(|e| e.spec().parameters.len()).sum();

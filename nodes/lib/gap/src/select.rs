@@ -164,7 +164,7 @@ fn first_look(
     };
     let mut starts: Vec<Vec<f64>> = extra.to_vec();
     if !spec.flat_at_null {
-        let from = state.of(effect).map_or_else(|| Engine::null_values(effect), <[f64]>::to_vec);
+        let from = state.of(effect).map_or_else(|| engine.absent(effect), <[f64]>::to_vec);
         starts.push(clamp(from.iter().zip(&screened.step).map(|(v, s)| v + s).collect()));
     }
     if extra.is_empty() {
@@ -210,13 +210,13 @@ fn refits(engine: &Engine<'_>, state: &State, looks: Vec<State>, windows: &Windo
         .collect()
 }
 
-/// The largest parameter over its size; of effects whose later parameters only place them, the first.
+/// How far the largest parameter is from its absence over its size; of effects whose later parameters only place them, the first.
 pub(crate) fn relative_size(engine: &Engine<'_>, effect: EffectId, own: &[f64]) -> f64 {
     let sizing = if effect == EffectId::LowGripPatch { 1 } else { own.len() };
     own.iter()
-        .zip(effect.spec().parameters)
+        .zip(engine.absent(effect).iter().zip(effect.spec().parameters))
         .take(sizing)
-        .map(|(v, p)| ((v - p.null) / engine.size(p)).abs())
+        .map(|(v, (absent, p))| ((v - absent) / engine.size(p)).abs())
         .fold(0.0, f64::max)
 }
 

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::effects::EffectId;
 use crate::engine::State;
-use crate::model::{BASE, HOLD};
+use crate::model::BASE;
 use crate::outcome::EffectParameter;
 
 /// Half width of a 90 % interval in standard deviations.
@@ -72,11 +72,8 @@ pub(crate) fn sizes(
 fn standard_error(state: &State, from: usize, j: usize, count: usize, blocks: &[usize]) -> f64 {
     let Some(fit) = &state.fit else { return f64::NAN };
     let all = &fit.linearization;
-    let hold_is_free = all.gradient.len() == state.parameters.len();
     let own = from..from + count;
-    let kept: Vec<(usize, usize)> = (0..state.parameters.len())
-        .filter(|&k| hold_is_free || k != HOLD)
-        .enumerate()
+    let kept: Vec<(usize, usize)> = (state.free.iter().copied().enumerate())
         .filter(|(_, k)| own.contains(k) || !fit.on_bound.contains(k))
         .collect();
     let Some(place) = kept.iter().position(|(_, k)| *k == j) else { return f64::NAN };

@@ -7,7 +7,7 @@ use crate::noise::spread;
 use crate::outcome::{Diagnosis, GapBudget, Series, TirePair, Verdict, Where};
 use crate::recording::Recording;
 use crate::windows::{HORIZON_S, NEEDED_S, Split, split};
-use crate::{Estimate, GapError, Request};
+use crate::{Estimate, ExtendedModelFile, GapError, Request};
 
 /// Held-out time that a score needs.
 const LEAST_HELD_OUT_S: f64 = 3.0;
@@ -57,7 +57,7 @@ pub(crate) fn refused(request: &Request<'_>, error: &GapError, data_health: Data
             "corners to both sides, up to half of the grip or more, with v_y, yaw rate and steering recorded"
         }
     };
-    let tires = request.tires.unwrap_or(PacejkaParameters::from_array([f64::NAN; 8]));
+    let tires = request.given_tires().unwrap_or(PacejkaParameters::from_array([f64::NAN; 8]));
     let unknown = Estimate::UNKNOWN;
     Diagnosis {
         verdict: Verdict::NotIdentifiable,
@@ -79,6 +79,7 @@ pub(crate) fn refused(request: &Request<'_>, error: &GapError, data_health: Data
         },
         gap_closed_fraction: unknown,
         tires: TirePair { without_effect: tires, with_effect: tires },
+        extended_model: request.model.cloned().unwrap_or_else(|| ExtendedModelFile::of_tires(tires)),
         data_health,
         drive_next: vec![next.to_owned()],
         looks: Vec::new(),

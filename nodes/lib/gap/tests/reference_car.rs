@@ -17,15 +17,7 @@ fn car() -> CarParameters {
 
 fn diagnosed(recording: &StateSequence, without: &[String]) -> Diagnosis {
     let vehicle = nominal(&car());
-    let request = Request {
-        sequence: recording,
-        held_out: None,
-        reference: None,
-        vehicle: &vehicle,
-        tires: None,
-        without,
-        only: &[],
-    };
+    let request = Request { without, ..Request::new(recording, &vehicle) };
     diagnose(&request, &mut |_| {}).unwrap()
 }
 
@@ -35,7 +27,7 @@ fn named(d: &Diagnosis) -> Vec<&'static str> {
 
 #[test]
 fn a_clear_effect_is_named_with_its_size_and_closes_the_gap() {
-    let recording = drive(&car(), Some("tire_relaxation=0.45"), DURATION_S, 21).unwrap();
+    let recording = drive(&car(), &["tire_relaxation=0.45"], DURATION_S, 21).unwrap();
     let d = diagnosed(&recording, &[]);
     assert_eq!((d.verdict, named(&d)[0]), (Verdict::Effects, "tire_relaxation"), "{}", d.text());
     let sigma_m = d.effects[0].parameters["sigma_m"].value;
@@ -51,7 +43,7 @@ fn a_clear_effect_is_named_with_its_size_and_closes_the_gap() {
 
 #[test]
 fn without_an_effect_nothing_is_named() {
-    let recording = drive(&car(), None, DURATION_S, 22).unwrap();
+    let recording = drive(&car(), &[], DURATION_S, 22).unwrap();
     let d = diagnosed(&recording, &[]);
     assert!(matches!(d.verdict, Verdict::NoGap | Verdict::TireRetuneOnly), "{}", d.text());
     assert_eq!(named(&d), Vec::<&str>::new());
@@ -59,19 +51,11 @@ fn without_an_effect_nothing_is_named() {
 
 #[test]
 fn an_effect_left_out_is_not_named_and_unknown_names_are_refused() {
-    let recording = drive(&car(), Some("v_y_bias=0.15"), DURATION_S, 23).unwrap();
+    let recording = drive(&car(), &["v_y_bias=0.15"], DURATION_S, 23).unwrap();
     let d = diagnosed(&recording, &["v_y_bias".to_owned()]);
     assert!(d.effects.iter().all(|e| e.name != "v_y_bias"));
     let vehicle = nominal(&car());
-    let request = Request {
-        sequence: &recording,
-        held_out: None,
-        reference: None,
-        vehicle: &vehicle,
-        tires: None,
-        without: &["magic".to_owned()],
-        only: &[],
-    };
+    let request = Request { without: &["magic".to_owned()], ..Request::new(&recording, &vehicle) };
     let error = diagnose(&request, &mut |_| {}).unwrap_err();
     assert!(matches!(error, GapError::UnknownEffect { .. }), "{error}");
 }
@@ -102,18 +86,7 @@ fn data_that_cannot_tell_get_that_verdict_and_malformed_data_an_error() {
         ..StateSequence::default()
     };
     let vehicle = nominal(&car());
-    let answer = |sequence: &StateSequence| {
-        let request = Request {
-            sequence,
-            held_out: None,
-            reference: None,
-            vehicle: &vehicle,
-            tires: None,
-            without: &[],
-            only: &[],
-        };
-        diagnose(&request, &mut |_| {})
-    };
+    let answer = |sequence: &StateSequence| diagnose(&Request::new(sequence, &vehicle), &mut |_| {});
     for (name, sequence, reason) in [
         ("straight only", straight.clone(), "cornering says nothing"),
         ("stopped", StateSequence { v_x_mps: vec![0.0; n], ..cornering.clone() }, "can be used"),
@@ -147,7 +120,7 @@ fn data_that_cannot_tell_get_that_verdict_and_malformed_data_an_error() {
 
 #[test]
 fn one_lap_hides_what_needs_a_second() {
-    let recording = drive(&car(), None, 12.0, 24).unwrap();
+    let recording = drive(&car(), &[], 12.0, 24).unwrap();
     let d = diagnosed(&recording, &[]);
     let patch = d.invisible.iter().find(|i| i.name == "low_grip_patch").unwrap();
     assert!(patch.reason.contains("lap") || patch.reason.contains("pass"), "{}", patch.reason);
@@ -175,7 +148,7 @@ fn thinned(sequence: &StateSequence, step: usize, from_s: f32, to_s: f32) -> Sta
 
 #[test]
 fn short_slow_and_broken_recordings_get_an_answer() {
-    let recording = drive(&car(), Some("v_y_bias=0.3"), 20.0, 25).unwrap();
+    let recording = drive(&car(), &["v_y_bias=0.3"], 20.0, 25).unwrap();
     let mut nan = thinned(&recording, 1, 0.0, 0.0);
     for k in (300..900).step_by(7) {
         nan.v_y_mps[k] = f32::NAN;
@@ -188,15 +161,7 @@ fn short_slow_and_broken_recordings_get_an_answer() {
     ] {
         let vehicle = nominal(&car());
         let only = ["v_y_bias".to_owned(), "steering_offset".to_owned()];
-        let request = Request {
-            sequence: &sequence,
-            held_out: None,
-            reference: None,
-            vehicle: &vehicle,
-            tires: None,
-            without: &[],
-            only: &only,
-        };
+        let request = Request { only: &only, ..Request::new(&sequence, &vehicle) };
         match diagnose(&request, &mut |_| {}) {
             // An answer comes with what cannot be known.
             Ok(d) => assert!(!d.reasons.is_empty() && !d.text().is_empty(), "{name}"),

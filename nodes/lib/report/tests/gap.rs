@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use gripsight_gap::{
-    Diagnosis, EffectParameter, Estimate, GapBudget, Identity, Invisible, Place, Prediction, RankedEffect,
+    Diagnosis, EffectParameter, ExtendedModelFile, Estimate, GapBudget, Identity, Invisible, Place, Prediction, RankedEffect,
     Series, TirePair, Verdict, Where,
 };
 use gripsight_report::{GapInput, Header, gap_page};
@@ -88,6 +88,7 @@ fn diagnosis() -> Diagnosis {
             scored_on: "held-out blocks",
         },
         gap_closed_fraction: estimate(0.7, 0.1),
+        extended_model: ExtendedModelFile::of_tires(tires),
         tires: TirePair { without_effect: tires, with_effect: tires },
         data_health: DataHealth {
             samples: 6000,

@@ -25,6 +25,7 @@ mod tire;
 
 use gripsight_vehicle::Real;
 
+use crate::GapError;
 use crate::terms::{Axles, Car, Moment, Motion, Outputs};
 
 /// What must be recorded for an effect to show.
@@ -233,6 +234,14 @@ impl EffectId {
     #[must_use]
     pub fn by_name(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|e| e.spec().name == name)
+    }
+
+    /// The effect of a name from outside.
+    pub(crate) fn known(name: &str) -> Result<Self, GapError> {
+        Self::by_name(name).ok_or_else(|| GapError::UnknownEffect {
+            name: name.to_owned(),
+            known: Self::ALL.iter().map(|e| e.name()).collect::<Vec<_>>().join(", "),
+        })
     }
 
     /// Canonical name.

@@ -13,7 +13,7 @@ const MU: f64 = 0.95;
 /// One lap after the other on the club track, with steering dither.
 pub(crate) fn drive(
     car: &CarParameters,
-    effect: Option<&str>,
+    effects: &[&str],
     duration_s: f64,
     seed: u64,
 ) -> anyhow::Result<StateSequence> {
@@ -24,7 +24,7 @@ pub(crate) fn drive(
         .friction(Friction::Uniform { mu: MU })
         .duration(duration_s)
         .seed(seed);
-    if let Some(text) = effect {
+    for text in effects {
         scenario = scenario.effect(EffectSetting::parse(text)?);
     }
     let recording = Simulation::new(scenario)?.run(|_| {});
