@@ -9,6 +9,10 @@ const NO_WORSE: f64 = 1.02;
 /// Largest scatter of v_y, as a share of the slip at which the rear tires' linear force would meet their peak, that tires can be fitted through.
 const V_Y_SHARE: f64 = 0.25;
 
+/// A cornering stiffness whose 90 % interval reaches further than this share of its value on either side is not good enough to steer by. On
+/// development draws (seeds 5000-5499) all sets with a stiffness off by more than 25 % had wider ones.
+const STIFFNESS_KNOWN: f64 = 0.2;
+
 /// No steering that a driver can race with answers later than this.
 const LONGEST_DELAY_S: f64 = 0.2;
 
@@ -64,6 +68,18 @@ pub(crate) fn judge(run: &Identification, outcome: &mut Outcome) {
             outcome.v_x_range_mps.high
         ));
     }
+    let stiffness = &outcome.cornering_stiffness_n_per_rad;
+    for (axle, k) in [("front", stiffness.front), ("rear", stiffness.rear)] {
+        let share = (k.high - k.value) / k.value;
+        if share.is_nan() || share > STIFFNESS_KNOWN {
+            against.push(format!(
+                "{axle} cornering stiffness is known to {:.0} % only (90 % interval; at most {:.0} % can be used)",
+                100.0 * share,
+                100.0 * STIFFNESS_KNOWN
+            ));
+            drive.push(format!("drive longer, with more turn-ins below the limit of the {axle} tires"));
+        }
+    }
     let peak = &outcome.peak_friction;
     for (axle, friction, slip) in [
         ("front", &peak.front, &outcome.slip_range_rad.front),
@@ -105,7 +121,7 @@ pub(crate) fn judge(run: &Identification, outcome: &mut Outcome) {
     }
     let delay_s = outcome.signals.steering_delay_s;
     if delay_s > LONGEST_DELAY_S {
-        remarks.push(format!(
+        against.push(format!(
             "the car answers {delay_s:.2} s after the recorded steering, later than a steering (at most {LONGEST_DELAY_S} s): filtered odometry or clocks \
              that differ; lever arm and stiffnesses bear what a delay does not explain of it"
         ));

@@ -201,8 +201,8 @@ fn peak_friction(run: &Identification, tires: &PacejkaParameters) -> PerAxle<Pea
     let axle = |axle: &MagicFormula, direct: &MagicFormula, peak: &PeakEvidence| {
         let reached = peak.reached;
         if reached {
-            let half = peak.half_width + (axle.d - direct.d).abs();
-            let (low, high) = ((axle.d - half).max(0.0), axle.d + half);
+            let off = (axle.d - direct.d).abs();
+            let (low, high) = ((axle.d - peak.below - off).max(0.0), axle.d + peak.above + off);
             PeakFriction { value: axle.d, low, high, reached, from_prior: false }
         } else {
             let from_prior = peak.is_the_priors(run.prior);

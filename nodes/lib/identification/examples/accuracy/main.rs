@@ -49,7 +49,7 @@ fn header() -> String {
     let peak = |a: char| format!("d{a}_floor,d{a}_true,d{a},d{a}_lo,d{a}_hi,d{a}_reached");
     let signals = SIGNALS.map(|n| format!("{n}_true,{n},{n}_lo,{n}_hi")).join(",");
     format!(
-        "run,rmse_f,floor_f,rmse_r,floor_r,{},{},{},{},{signals},relax,combined,transfer,seconds,iterations,accepted,reasons",
+        "run,rmse_f,floor_f,rmse_r,floor_r,{},{},{},{},{signals},relax,combined,transfer,slip_f,slip_r,seconds,iterations,accepted,reasons",
         axle('f'),
         axle('r'),
         peak('f'),
@@ -101,7 +101,9 @@ pub(crate) fn row(
         add(&[*truth, e.value, e.low, e.high]);
     }
     let nuisance = &outcome.nuisance;
-    add(&[nuisance.relaxation_m, nuisance.combined_slip, nuisance.load_transfer, seconds]);
+    add(&[nuisance.relaxation_m, nuisance.combined_slip, nuisance.load_transfer]);
+    let slips = outcome.slip_range_rad.map(|slip| slip.high.max(-slip.low));
+    add(&[slips.front, slips.rear, seconds]);
     cells.push(outcome.iterations.to_string());
     cells.push(u8::from(outcome.accepted).to_string());
     cells.push(format!("\"{}\"", outcome.reasons.join(" | ").replace('"', "'")));

@@ -6,14 +6,16 @@ use nalgebra::{DMatrix, DVector};
 use crate::direct::{Slips, covariance_of};
 use crate::rollout::tires_of;
 use crate::shooting::Fit;
+use crate::tires::{C_PRIOR, D_BOUNDS, E_PRIOR};
 use crate::{Estimate, FrictionPrior};
 
 /// Whether an axle's peak shows in the data, and how well it is known then.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PeakEvidence {
     pub(crate) reached: bool,
-    /// Half of D's 90 % interval.
-    pub(crate) half_width: f64,
+    /// How far D's 90 % interval reaches below and above it.
+    pub(crate) below: f64,
+    pub(crate) above: f64,
     /// Largest F_y/F_z within the slips visited.
     pub(crate) height: f64,
 }
@@ -29,25 +31,41 @@ impl PeakEvidence {
 const KNOWN: f64 = 0.1;
 /// Half of the 90 % interval of D that the shape of a four-parameter curve costs, as a share of D: real curves have another shape.
 const FORM: f64 = 0.05;
+/// C of a curve that is one sigma flatter than the likely one: what the peak would be if the tire went on rising where it was not driven.
+const FLATTER_C: f64 = C_PRIOR.mean - C_PRIOR.sigma;
 /// What the stiffness alone would make of the largest slip has to exceed D by this factor: a knee that comes earlier is the model's, not the tire's.
 const PEAK_EXCESS: f64 = 1.6;
 /// No tire slides at less: a knee that comes earlier is made by the signals.
 const LEAST_PEAK_SLIP_RAD: f64 = 0.05;
 
-/// Whether an axle's peak shows. What is uncertain of D: the height of the curve where it was driven, as far as the data tell; all that D lies
-/// above that; and the curve's form.
+/// Whether an axle's peak shows. What is uncertain of D: the height of the curve where it was driven, as far as the data tell; the curve's form;
+/// below it all that D lies above that height, above it all that a flatter curve through the same height would rise to.
 pub(super) fn evidence(fit: &Fit, offset: usize, slips: &Slips) -> PeakEvidence {
     let tires = tires_of(&fit.parameters);
     let axle = if offset == 0 { tires.front } else { tires.rear };
     let furthest = slips.range_rad.low.abs().max(slips.range_rad.high.abs());
     let height = axle.max_force_within(furthest);
     let error = Estimate::Z90 * height_error(fit, offset, slips);
-    let half_width = error.hypot(axle.d - height).hypot(FORM * axle.d);
-    let reached = half_width < KNOWN * axle.d
+    let known = error.hypot(FORM * axle.d);
+    let below = known.hypot(axle.d - height);
+    let above = known.hypot((flatter_peak(&axle, furthest, height) - axle.d).max(0.0));
+    let reached = below < KNOWN * axle.d
         && furthest > LEAST_PEAK_SLIP_RAD
         && axle.normalized_stiffness() * furthest > PEAK_EXCESS * axle.d
         && !fit.on_bound.contains(&(offset + 2));
-    PeakEvidence { reached, half_width, height }
+    PeakEvidence { reached, below, above, height }
+}
+
+/// D of the flatter curve with the same stiffness and, at the largest slip driven, the same force.
+fn flatter_peak(axle: &MagicFormula, furthest_rad: f64, height: f64) -> f64 {
+    let curve =
+        |d: f64| MagicFormula::from_stiffness(axle.normalized_stiffness(), FLATTER_C, d, E_PRIOR.mean);
+    let (mut low, mut high) = (height, D_BOUNDS.1.max(height));
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if curve(middle).max_force_within(furthest_rad) < height { low = middle } else { high = middle }
+    }
+    high
 }
 
 /// Standard error of the largest F_y/F_z within the slips visited; infinite where nothing is known of it. (That of D alone says little of a
