@@ -56,7 +56,8 @@ enum BagCommand {
 }
 
 fn effects_help() -> String {
-    let list = EFFECTS.map(|(name, parameters)| format!("  {name:<18} {}", parameters.join(", ")));
+    let list: Vec<String> =
+        EFFECTS.iter().map(|kind| format!("  {:<18} {}", kind.name, kind.parameters.join(", "))).collect();
     format!("Effects and their parameters:\n{}", list.join("\n"))
 }
 

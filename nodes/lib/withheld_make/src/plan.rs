@@ -18,7 +18,7 @@ pub(crate) struct Planned {
 
 /// Effects that can be put into a measured drive.
 pub(crate) fn injectable() -> Vec<&'static str> {
-    gripsight_bag::effect::EFFECTS.iter().map(|(name, _)| *name).collect()
+    gripsight_bag::effect::EFFECTS.iter().map(|kind| kind.name).collect()
 }
 
 /// A quarter without effect, a sixth each with an effect outside the library, with the true effect left out and with two, the

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use gripsight_bag::effect::{EFFECTS, Effect};
+use gripsight_bag::effect::{EFFECTS, Effect, EffectKind};
 use gripsight_bag::{Bag, BagError, RawMessage, Role, TopicMap, inject, read_sequences};
 use gripsight_signals::StateSequence;
 use tempfile::TempDir;
@@ -23,7 +23,7 @@ fn only_the_effects_stream_changes() {
     let path = telemetry_bag(&folder.path().join("bag.mcap"), 200);
     let out = folder.path().join("out.mcap");
     let recorded = messages(&path);
-    for (name, _) in EFFECTS {
+    for EffectKind { name, .. } in &EFFECTS {
         let effect: Effect = format!("{name}=0.02").parse().unwrap();
         let changed = inject(&path, &TopicMap::default(), &[effect], &out).unwrap();
         let topic = ["/odom", "/drive", "/imu", "/wheels"][effect.stream() as usize];
