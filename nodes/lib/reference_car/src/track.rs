@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::ReferenceCarError;
 
 /// Names of the closed tracks.
-pub const TRACK_NAMES: [&str; 5] = ["oval", "club", "esses", "bean", "clover"];
+pub const TRACK_NAMES: [&str; 7] = ["oval", "club", "esses", "bean", "clover", "harbor", "valley"];
 
 /// A closed centre line, sampled evenly by arc length.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,6 +56,8 @@ fn shape(name: &str) -> Option<Shape> {
         "esses" => Shape { size_m: 230.0, cosines: &[(2, 0.22), (7, 0.035)], sines: &[(3, 0.1), (5, 0.05)] },
         "bean" => Shape { size_m: 210.0, cosines: &[(1, 0.32), (2, -0.24)], sines: &[(3, 0.08)] },
         "clover" => Shape { size_m: 220.0, cosines: &[(3, 0.24), (2, 0.1)], sines: &[(5, 0.04)] },
+        "harbor" => Shape { size_m: 205.0, cosines: &[(2, 0.2), (4, 0.05)], sines: &[(1, 0.15), (3, 0.1)] },
+        "valley" => Shape { size_m: 215.0, cosines: &[(1, 0.2), (3, 0.14)], sines: &[(2, 0.2), (5, 0.03)] },
         _ => return None,
     };
     Some(shape)

@@ -34,8 +34,8 @@ impl Pool {
 
     fn tracks(self) -> &'static [&'static str] {
         match self {
-            Self::Development => &["oval", "club", "esses"],
-            Self::Test => &["bean", "clover"],
+            Self::Development => &["oval", "club", "esses", "bean", "clover"],
+            Self::Test => &["harbor", "valley"],
         }
     }
 
