@@ -159,8 +159,18 @@ impl Answer {
     /// Shrinkage on the held-out bag over the oracle's; none where either cannot be said or the oracle shrinks nothing.
     #[must_use]
     pub fn shrinkage_over_oracle(&self) -> Option<f64> {
+        self.over_oracle(self.said.shrinkage()?)
+    }
+
+    /// The same of a residual network that names nothing.
+    #[must_use]
+    pub fn residual_over_oracle(&self) -> Option<f64> {
+        self.over_oracle(self.said.residual_shrinkage()?)
+    }
+
+    fn over_oracle(&self, shrinkage: f64) -> Option<f64> {
         let oracle = self.oracle.as_ref()?.shrinkage()?;
-        (oracle > 0.05).then_some(self.said.shrinkage()? / oracle)
+        (oracle > 0.05).then_some(shrinkage / oracle)
     }
 }
 

@@ -42,6 +42,7 @@ pub(crate) fn lines(scope: &[&Answer], own: &[&Answer], calibration: &Calibratio
     let sizes: Vec<SizeCheck> = scope.iter().flat_map(|a| a.sizes()).collect();
     let coverage = Rate::count(&sizes, |s| s.covered);
     let shrinkage = median(scope.iter().filter_map(|a| a.shrinkage_over_oracle()).collect());
+    let residual = median(scope.iter().filter_map(|a| a.residual_over_oracle()).collect());
     let time_s = median(own.iter().map(|a| a.time_s).collect());
     let perfect = match calibration.cases {
         0 => "as a perfect forecaster's".to_owned(),
@@ -107,6 +108,13 @@ pub(crate) fn lines(scope: &[&Answer], own: &[&Answer], calibration: &Calibratio
             shrinkage,
             shrinkage >= t.shrinkage,
         ),
+        Line {
+            what: "the same of an S4 residual, which names nothing".to_owned(),
+            wanted: "-".to_owned(),
+            rate: None,
+            value: finite(residual),
+            met: None,
+        },
         Line {
             what: "time for a case, median (s)".to_owned(),
             wanted: format!("<= {} for 60 s", t.time_s),

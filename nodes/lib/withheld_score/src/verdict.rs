@@ -48,6 +48,9 @@ pub struct SaidGap {
     pub after: Figure,
     /// With flexible terms.
     pub unstructured_ceiling: Figure,
+    /// With a residual network in place of effects.
+    #[serde(default)]
+    pub s4_residual: Figure,
     /// What noise leaves.
     pub noise_floor: Figure,
 }
@@ -86,8 +89,17 @@ impl Said {
     /// Share of the gap above the noise that is gone on the held-out bag, tires and effects together.
     #[must_use]
     pub fn shrinkage(&self) -> Option<f64> {
-        let (nominal, after, floor) =
-            (self.gap.nominal.value?, self.gap.after.value?, self.gap.noise_floor.value?);
+        self.shrunk_to(self.gap.after)
+    }
+
+    /// The same with other tires and a residual network that names nothing.
+    #[must_use]
+    pub fn residual_shrinkage(&self) -> Option<f64> {
+        self.shrunk_to(self.gap.s4_residual)
+    }
+
+    fn shrunk_to(&self, after: Figure) -> Option<f64> {
+        let (nominal, after, floor) = (self.gap.nominal.value?, after.value?, self.gap.noise_floor.value?);
         (nominal > floor).then(|| (nominal - after) / (nominal - floor))
     }
 }
