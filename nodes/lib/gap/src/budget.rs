@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::effects::EffectId;
 use crate::engine::{Engine, Nominal, State};
 use crate::evaluate::{Estimate, bootstrap, by_block, interval, mean, of_picked};
-use crate::flexible::Flexible;
+use crate::flexible::{Flexible, Room};
 use crate::outcome::GapBudget;
 use crate::recording::Recording;
 use crate::select::Round;
@@ -91,7 +91,7 @@ impl Budget {
             })
             .collect();
         let slip = large_slip_rad(engine, null, &windows.training);
-        let flexible = Flexible::new(engine.recording, slip, engine.vehicle.wheelbase_m());
+        let flexible = Flexible::new(engine.recording, slip, engine.vehicle.wheelbase_m(), &Room::ALL);
         let ceiling = engine.fit_flexible(state, &flexible, &windows.training);
         let whole = match steps.last() {
             Some(last) if steps.len() > 1 => closed(&retuned, last, &retuned),
@@ -169,7 +169,7 @@ fn closed(from: &[(f64, f64)], to: &[(f64, f64)], retuned: &[(f64, f64)]) -> Est
 }
 
 /// A large slip angle of the recording on the fitted tires.
-fn large_slip_rad(engine: &Engine<'_>, null: &State, windows: &Windows) -> f64 {
+pub(crate) fn large_slip_rad(engine: &Engine<'_>, null: &State, windows: &Windows) -> f64 {
     let car = gripsight_vehicle::SingleTrack::new(engine.vehicle, &null.tires());
     let mut slips = Vec::new();
     for w in &windows.windows {

@@ -3,17 +3,18 @@
 use gripsight_signals::{DataHealth, StateSequence};
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 
-use crate::budget::{Budget, Models};
+use crate::budget::{Budget, Models, large_slip_rad};
 use crate::effects::{EffectId, Need};
 use crate::engine::{Engine, State, TireTrust};
-use crate::outcome::{DetectionLimit, Diagnosis, Invisible, TirePair, Verdict};
+use crate::outcome::{DetectionLimit, Diagnosis, Invisible, TirePair, Unexplained};
 use crate::recording::Recording;
+use crate::rooms::Left;
 use crate::search::{Found, search};
 use crate::select::reweigh;
 use crate::usable::{Usable, cannot_tell, refused, usable};
-use crate::verdict::{decide, looks, rank};
+use crate::verdict::{Remains, claims, decide, looks, rank};
 use crate::windows::{Windows, split};
-use crate::{ExtendedModelFile, GapError, pictures, place};
+use crate::{ExtendedModelFile, GapError, Verdict, noise, pictures, place};
 
 /// What is diagnosed, and with what.
 #[derive(Debug, Clone)]
@@ -88,7 +89,7 @@ fn explain(
     progress: &mut dyn FnMut(&str),
 ) -> Result<Diagnosis, GapError> {
     let Usable { recording, windows } = usable;
-    let other = request.held_out.map(Recording::new).transpose()?;
+    let other = request.held_out.map(|h| Recording::beside(h, Some(&recording))).transpose()?;
     progress("fitting the tires");
     let (tires, trust) = match (request.given_tires(), request.reference) {
         (Some(tires), _) => (tires, TireTrust::file()),
@@ -123,21 +124,28 @@ fn explain(
     } else {
         (null, state)
     };
-    progress("scoring on held-out data");
-    let models = Models { nominal: &nominal, null: &null, state: &state, last: &last };
-    let budget = Budget::of(&engine, other.as_ref(), &windows, &models);
-    let caveat = crate::noise::caveat(&recording);
-    let (verdict, mut reasons) = decide(&budget, &last, &state, &costs, crate::noise::is_known(&recording));
-    reasons.extend(caveat);
+    progress("looking at what is left, room by room");
+    let slip_rad = large_slip_rad(&engine, &null, &windows.training);
+    let left = |state: &State| Left::by(&engine, state, &windows.training, slip_rad);
+    let (before, after) = (left(&null), left(&state));
+    let remains = Remains { before: &before, after: &after, noise_is_known: noise::is_known(&recording) };
     let blocks = &windows.training.block;
-    let left = costs.last().copied().unwrap_or(f64::NAN);
-    let mut effects = rank(&evidence, &last, &state, &budget, blocks, left);
-    if verdict != Verdict::Effects {
-        // Found, but not enough to be named.
-        for e in &mut effects {
-            (e.accepted, e.confidence) = (false, 0.0);
-        }
-    }
+    let mut claims =
+        claims(&engine, &evidence, &state, &remains, blocks, costs.last().copied().unwrap_or(f64::NAN));
+    // What is no more than a candidate beside named effects is left out of the model.
+    let named: Vec<EffectId> = claims.iter().filter(|c| c.named).map(|c| c.effect).collect();
+    let model = if named.is_empty() || named.len() == state.named.len() {
+        state.clone()
+    } else {
+        let values = engine.carry(&state, &named);
+        engine.fit(&named, &values, Some(state.starts.clone()), &windows.training, 10)
+    };
+    progress("scoring on held-out data");
+    let models = Models { nominal: &nominal, null: &null, state: &model, last: &last };
+    let budget = Budget::of(&engine, other.as_ref(), &windows, &models);
+    let (verdict, mut reasons) = decide(&budget, &mut claims, &remains, &costs);
+    reasons.extend(noise::caveat(&recording));
+    let effects = rank(&claims, &last, &budget);
     let scored_windows =
         if windows.held_out.windows.is_empty() { &windows.training } else { &windows.held_out };
     let on_all = split(&recording, false).training;
@@ -166,15 +174,19 @@ fn explain(
         identities: recording.identities.clone(),
         gap: budget.stated(&recording),
         gap_closed_fraction: budget.closed,
-        tires: TirePair { without_effect: null.tires(), with_effect: state.tires() },
+        tires: TirePair { without_effect: null.tires(), with_effect: model.tires() },
         extended_model: ExtendedModelFile::of(
             &engine,
-            if verdict == Verdict::Effects { &state } else { &null },
+            if verdict == Verdict::Effects { &model } else { &null },
         ),
         data_health,
         looks: looks(&engine, &evidence, &last, &state),
         search_costs: costs,
-        series: pictures::series(&engine, &nominal, &null, &state, &on_all, &nominal_score, scored_windows),
+        unexplained: Unexplained {
+            cost: [before.cost, after.cost],
+            rooms: before.gains.iter().zip(&after.gains).map(|(b, a)| (b.0.name(), [b.1, a.1])).collect(),
+        },
+        series: pictures::series(&engine, &nominal, &null, &model, &on_all, &nominal_score, scored_windows),
     })
 }
 

@@ -65,6 +65,9 @@ const USUAL: [f64; 5] = [0.33, 0.27, 0.33, 0.14, 0.67];
 /// Windows whose mean square is beyond this many sigma count less and less.
 pub(crate) const ROBUST_K: f64 = 3.0;
 
+/// Standard deviation that parameters of flexible terms are expected to have.
+pub(crate) const FLEXIBLE_RIDGE: f64 = 1.0;
+
 /// A model with its parameters fitted.
 #[derive(Debug, Clone)]
 pub(crate) struct State {
@@ -342,7 +345,7 @@ impl<'a> Engine<'a> {
         out
     }
 
-    fn problem<'p>(
+    pub(crate) fn problem<'p>(
         &'p self,
         model: &'p ExtendedModel<'a>,
         windows: &'p [Window],
@@ -380,12 +383,11 @@ impl<'a> Engine<'a> {
 
     /// Fits flexible terms on top of a state, whose own parameters stay: an upper bound of what an additive term explains.
     pub(crate) fn fit_flexible(&self, state: &State, flexible: &Flexible, windows: &Windows) -> Vec<f64> {
-        const RIDGE: f64 = 1.0;
         const STEPS: usize = 2;
         let model = self.model(&state.effects, Some(flexible));
         let mut values = state.parameters.clone();
         values.extend(std::iter::repeat_n(0.0, flexible.parameters()));
-        let mut parameters = self.parameters(&state.named, &state.effects, &values, RIDGE);
+        let mut parameters = self.parameters(&state.named, &state.effects, &values, FLEXIBLE_RIDGE);
         let own = state.parameters.len();
         parameters[..own].iter_mut().for_each(|p| p.free = false);
         let problem = self.problem(&model, &windows.windows, &parameters, STEPS);

@@ -10,8 +10,12 @@
 //!    parameters from several starts; the null is refitted from the winner. A winner is taken if it is certain, believable in size and
 //!    closes enough of what remains; then the search goes on from there. An effect that a later one explains is dropped, and each
 //!    that is left is put up against all others once more, with the rest of the model in place ([`Look`]).
-//! 4. Open-loop rollouts of 1 s on held-out blocks (or another bag): nominal, retuned, with the effects, with flexible terms on top
-//!    (the ceiling), against the noise. What flexible terms still explain says whether a cause is missing: "none of these".
+//! 4. What the retuned tires and the effects leave is looked at room by room ([`Unexplained`]): steering, sensors, lateral and longitudinal
+//!    forces, road and wind each have free terms (impulse responses, curves, places) that can do roughly what any cause there does. An effect
+//!    that is the cause leaves them nothing; a stand-in does, and its confidence falls. Below even odds an effect is a candidate, not a
+//!    name. Where nothing is named, what the rooms explain tells "none of these" from a retune.
+//! 5. Open-loop rollouts of 1 s on held-out blocks (or another bag): nominal, retuned, with the effects, with all free terms on top (the
+//!    ceiling), against the noise. Effects that reach too little of the ceiling are not named.
 //!
 //! Intervals of sizes use blocks of 4 s as clusters and add a share of the size for errors of the model that all blocks share; that
 //! share, and all thresholds (`select::thresholds`, `verdict`), were fixed on development drives of the reference car.
@@ -60,6 +64,7 @@ mod outcome;
 mod pictures;
 mod place;
 mod recording;
+mod rooms;
 mod screen;
 mod search;
 mod select;
@@ -82,7 +87,7 @@ pub use extended_file::ExtendedModelFile;
 pub use identities::Identity;
 pub use outcome::{
     Comparison, DetectionLimit, Diagnosis, EffectParameter, GapBudget, Invisible, Look, Place, Prediction,
-    RankedEffect, Series, TirePair, Verdict, Where,
+    RankedEffect, Series, TirePair, Unexplained, Verdict, Where,
 };
 pub use recording::{Channel, Recording};
 pub use terms::{Axle, Axles, Car, Moment, Motion, Outputs};

@@ -82,6 +82,9 @@ impl<'a> ExtendedModel<'a> {
         for (effect, values) in self.with_parameters(p) {
             effect.steer(values, &mut series, run.dt_s);
         }
+        if let Some(flexible) = &self.flexible {
+            flexible.steer(self.flexible_parameters(p), run, window.from - run_in, &mut series);
+        }
         (series, run_in)
     }
 

@@ -36,6 +36,9 @@ struct Instant<T> {
     force_x_mps2: f64,
     minutes: f64,
     lap_share: f64,
+    place_rad: f64,
+    /// The sample before it.
+    sample: usize,
 }
 
 /// What an instant leaves behind for the next.
@@ -177,6 +180,8 @@ impl<T: Real> Mover<'_, '_, T> {
             force_x_mps2: run.force_x_mps2[a],
             minutes: (run.time_s(a) + share * run.dt_s) / 60.0,
             lap_share: lap[a] + (turn - turn.round()) * share,
+            place_rad: run.place_rad[a],
+            sample: a,
         }
     }
 
@@ -200,6 +205,7 @@ impl<T: Real> Mover<'_, '_, T> {
             minutes: now.minutes,
             lap_share: now.lap_share,
             lap_m: model.recording.laps.lap_m,
+            place_rad: now.place_rad,
         };
         let mut axles = car.axles_at_rest();
         for (effect, values) in model.with_parameters(self.p) {
@@ -249,9 +255,16 @@ impl<T: Real> Mover<'_, '_, T> {
             (front_y_n * car.l_f_m - rear_n * car.l_r_m) / car.yaw_inertia_kgm2 + motion.yaw_radps2;
         if let Some(flexible) = &model.flexible {
             let own = model.flexible_parameters(self.p);
-            let (more_y, more_yaw) = flexible.motion(own, &at, v_y, steady_rad, now.steering_rad);
-            a_y += more_y;
-            yaw_radps2 += more_yaw;
+            let rate = |i: usize| {
+                if h_s > 0.0 { (steady_rad[i] - memory.steady_rad[i]) / h_s } else { T::from(0.0) }
+            };
+            let [more_y, more_yaw] = flexible.forces(own, &at, steady_rad, [rate(0), rate(1)]);
+            let push = flexible.push(own, &model.recording.runs[self.window.segment], now.sample);
+            a_y += more_y + push.force_y_mps2;
+            yaw_radps2 += more_yaw + push.yaw_radps2;
+            motion.force_x_mps2 += push.force_x_mps2;
+            motion.gravity_x_mps2 += push.gravity_x_mps2;
+            motion.gravity_y_mps2 += push.gravity_y_mps2;
         }
         let a_x = if commanded {
             (-(front_n * sin) + now.force_x_mps2 * car.nominal_mass_kg) / car.mass_kg + motion.force_x_mps2

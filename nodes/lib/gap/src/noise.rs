@@ -24,29 +24,31 @@ pub(crate) fn sigma(runs: &[Run], c: usize) -> f64 {
 
 /// A noise that seems so many times larger at half the rate is not white: filtered, simulated, or not to be told from the motion.
 const WHITE_RATIO: f64 = 1.4;
+/// Up to this ratio the figure is rough, but of the right size: a few samples lost, or stamps that jitter, and filled in between.
+const ROUGH_RATIO: f64 = 2.5;
 
-/// Whether the noise of channel `c` can be told: above the least share, and the same at half the rate.
-pub(crate) fn is_clear(runs: &[Run], c: usize) -> bool {
+/// Whether the noise of channel `c` can be told: above the least share, and the same at half the rate, within a ratio.
+fn is_clear(runs: &[Run], c: usize, ratio: f64) -> bool {
     let noise = of(runs.iter().map(|r| r.measured[c].as_slice()));
     let halved: Vec<Vec<f64>> =
         runs.iter().map(|r| r.measured[c].iter().step_by(2).copied().collect()).collect();
-    noise > LEAST_SHARE * spread(runs, c, true) && of(halved.iter().map(Vec::as_slice)) < WHITE_RATIO * noise
+    noise > LEAST_SHARE * spread(runs, c, true) && of(halved.iter().map(Vec::as_slice)) < ratio * noise
 }
 
-/// The scored channels whose noise cannot be told.
-fn unclear(recording: &Recording) -> Vec<&'static str> {
+/// The scored channels whose noise cannot be told within a ratio.
+fn unclear(recording: &Recording, ratio: f64) -> Vec<&'static str> {
     let scored = (0..recording.channels.len()).filter(|&c| recording.channels[c].scored());
-    scored.filter(|&c| !is_clear(&recording.runs, c)).map(|c| recording.channels[c].name()).collect()
+    scored.filter(|&c| !is_clear(&recording.runs, c, ratio)).map(|c| recording.channels[c].name()).collect()
 }
 
-/// Whether the noise of most channels can be told, so that errors can be read against it.
+/// Whether the noise of most channels can be told, if roughly, so that errors can be read against it.
 pub(crate) fn is_known(recording: &Recording) -> bool {
-    2 * unclear(recording).len() <= recording.channels.iter().filter(|c| c.scored()).count()
+    2 * unclear(recording, ROUGH_RATIO).len() <= recording.channels.iter().filter(|c| c.scored()).count()
 }
 
 /// A sentence where the noise cannot be told from the signals.
 pub(crate) fn caveat(recording: &Recording) -> Option<String> {
-    let names = unclear(recording);
+    let names = unclear(recording, WHITE_RATIO);
     (!names.is_empty()).then(|| {
         format!(
             "noise cannot be told from these signals ({}: smoothed, interpolated or simulated): the floor is a lower bound, and so is every share of the gap; read the errors against each other, not against 1",
@@ -128,6 +130,8 @@ mod tests {
             a_x_mps2: vec![0.0; n],
             force_x_mps2: vec![0.0; n],
             lap_share: vec![0.0; n],
+            heading_rad: vec![0.0; n],
+            place_rad: vec![0.0; n],
             smooth: [vec![0.0; n], vec![0.0; n]],
             measured: vec![signal],
         }
@@ -140,10 +144,10 @@ mod tests {
         let motion = |k: usize| (k as f64 * 0.01 * 6.0).sin();
         let rough = [run(noise.iter().enumerate().map(|(k, n)| motion(k) + 0.02 * n).collect())];
         approx::assert_relative_eq!(sigma(&rough, 0), 0.02, max_relative = 0.05);
-        assert!(is_clear(&rough, 0));
+        assert!(is_clear(&rough, 0, WHITE_RATIO));
         let mean = |w: &[f64]| w.iter().sum::<f64>() / w.len() as f64;
         let filtered = [run(noise.windows(2).enumerate().map(|(k, w)| motion(k) + 0.02 * mean(w)).collect())];
-        assert!(!is_clear(&filtered, 0));
-        assert!(!is_clear(&[run((0..6000).map(motion).collect())], 0));
+        assert!(!is_clear(&filtered, 0, WHITE_RATIO));
+        assert!(!is_clear(&[run((0..6000).map(motion).collect())], 0, WHITE_RATIO));
     }
 }

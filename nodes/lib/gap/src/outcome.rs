@@ -224,6 +224,16 @@ pub struct Series {
     pub horizon: Vec<[f64; 4]>,
 }
 
+/// What the model does not explain of the windows that were fitted. Pairs are with retuned tires, and with the effects found.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Unexplained {
+    /// Weighted cost per residual: 0.75 is noise.
+    pub cost: [f64; 2],
+    /// By the place in which a cause can sit (steering, sensors, lateral forces, longitudinal forces, road and wind): how much of the cost
+    /// free terms of that place would explain on windows that they were not fitted to.
+    pub rooms: BTreeMap<&'static str, [f64; 2]>,
+}
+
 /// A diagnosis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
@@ -258,6 +268,8 @@ pub struct Diagnosis {
     pub looks: Vec<Look>,
     /// Weighted cost per residual with nothing claimed, and after each effect that was taken: about 0.8 is noise.
     pub search_costs: Vec<f64>,
+    /// What free terms would explain of the windows fitted, room by room.
+    pub unexplained: Unexplained,
     /// Points of the pictures.
     #[serde(skip)]
     pub series: Series,

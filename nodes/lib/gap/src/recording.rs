@@ -77,6 +77,10 @@ pub(crate) struct Run {
     pub(crate) a_x_mps2: Vec<f64>,
     pub(crate) force_x_mps2: Vec<f64>,
     pub(crate) lap_share: Vec<f64>,
+    /// Heading of the pose; 0 without one.
+    pub(crate) heading_rad: Vec<f64>,
+    /// Where on the course, as an angle: of the distance along the lap, without laps the heading.
+    pub(crate) place_rad: Vec<f64>,
     /// Lateral velocity and yaw rate, smoothed: what slips were before a window starts.
     pub(crate) smooth: [Vec<f64>; 2],
     /// Measured signals by channel, in the order of [`Recording::channels`].
@@ -124,6 +128,11 @@ impl Recording {
     /// # Errors
     /// What is wrong with the telemetry; [`GapError::TooCoarse`] below 15 Hz.
     pub fn new(sequence: &StateSequence) -> Result<Self, GapError> {
+        Self::beside(sequence, None)
+    }
+
+    /// Prepares a recording whose places are those of another one, where both are of one course.
+    pub(crate) fn beside(sequence: &StateSequence, other: Option<&Self>) -> Result<Self, GapError> {
         const LEAST_RATE_HZ: f64 = 15.0;
         let parts = segments(sequence, SHORTEST_S)?;
         let recorded_s = sequence.duration_s();
@@ -141,12 +150,12 @@ impl Recording {
         if dt_s > 1.0 / LEAST_RATE_HZ {
             return Err(GapError::TooCoarse { rate_hz: 1.0 / dt_s, needed_hz: LEAST_RATE_HZ });
         }
-        let laps = stations(&parts);
+        let laps = stations(&parts, other.map(|o| &o.laps));
         let has_command = !first.command_acceleration_mps2.is_empty();
         let identities = crate::identities::check(&parts);
         let channels = channels(first, has_command, &identities);
         let runs: Vec<Run> =
-            parts.iter().zip(&laps.share).map(|(s, share)| run(s, share, &channels)).collect();
+            parts.iter().zip(&laps.share).map(|(s, share)| run(s, &laps, share, &channels)).collect();
         let mut sigma: Vec<f64> = (0..channels.len()).map(|c| crate::noise::sigma(&runs, c)).collect();
         if let Some(c) = channels.iter().position(|c| *c == Channel::Heading) {
             sigma[c] = sigma[c].max(crate::noise::heading_wander(&runs, c, 1));
@@ -225,7 +234,7 @@ fn differs(a: &[f64], b: &[f64]) -> bool {
     apart > SHARE * fast
 }
 
-fn run(s: &Segment, lap_share: &[f64], channels: &[Channel]) -> Run {
+fn run(s: &Segment, laps: &Laps, lap_share: &[f64], channels: &[Channel]) -> Run {
     let half = (SMOOTH_S / s.dt_s).round().max(1.0) as usize;
     let (v_x_mps, v_x_rate) = local_quadratic(&s.v_x_mps, half, s.dt_s);
     let a_x_mps2 = if s.a_x_mps2.is_empty() {
@@ -251,6 +260,7 @@ fn run(s: &Segment, lap_share: &[f64], channels: &[Channel]) -> Run {
             Channel::LateralKinematics => kinematic(&v_x_mps, s),
         })
         .collect();
+    let heading_rad = if s.yaw_rad.is_empty() { vec![0.0; s.len()] } else { s.yaw_rad.clone() };
     Run {
         start_time_s: s.start_time_s,
         dt_s: s.dt_s,
@@ -259,6 +269,12 @@ fn run(s: &Segment, lap_share: &[f64], channels: &[Channel]) -> Run {
         a_x_mps2,
         force_x_mps2,
         lap_share: lap_share.to_vec(),
+        place_rad: if laps.lap_m > 0.0 {
+            lap_share.iter().map(|share| std::f64::consts::TAU * share).collect()
+        } else {
+            heading_rad.clone()
+        },
+        heading_rad,
         smooth: [&s.v_y_mps, &s.yaw_rate_radps].map(|c| local_quadratic(c, half, s.dt_s).0),
         measured,
     }

@@ -30,12 +30,14 @@ pub(crate) mod thresholds {
     pub(crate) const LEAST_SHARE: [f64; 2] = [0.08, 0.12];
     /// How sure it must be that a candidate beats the current model, in standard deviations over blocks.
     pub(crate) const LEAST_Z: f64 = 2.0;
-    /// The same for an effect that sits in one place of the lap: most blocks do not hold it.
-    pub(crate) const LEAST_PLACE_Z: f64 = 1.2;
+    /// The same for an effect that sits in one part of the lap: other blocks do not hold it.
+    pub(crate) const LEAST_PLACE_Z: f64 = 1.0;
     /// Largest effect that is believed, over the size that matters: what needs more stands in for something else.
     pub(crate) const MOST_SIZE: f64 = 4.5;
     /// Smallest effect that is named, over the size that matters.
     pub(crate) const LEAST_SIZE: f64 = 0.1;
+    /// The same for an effect that sits in one part of the lap.
+    pub(crate) const LEAST_PLACE_SIZE: f64 = 0.2;
     /// The same for an effect that every car has a little of, over what is usual.
     pub(crate) const LEAST_OVER_USUAL: f64 = 1.3;
     /// Candidates whose refits cannot be told apart by this many standard deviations are confused.
@@ -212,10 +214,9 @@ fn refits(engine: &Engine<'_>, state: &State, looks: Vec<State>, windows: &Windo
 
 /// How far the largest parameter is from its absence over its size; of effects whose later parameters only place them, the first.
 pub(crate) fn relative_size(engine: &Engine<'_>, effect: EffectId, own: &[f64]) -> f64 {
-    let sizing = if effect == EffectId::LowGripPatch { 1 } else { own.len() };
     own.iter()
         .zip(engine.absent(effect).iter().zip(effect.spec().parameters))
-        .take(sizing)
+        .take(effect.sizing())
         .map(|(v, (absent, p))| ((v - absent) / engine.size(p)).abs())
         .fold(0.0, f64::max)
 }
@@ -357,12 +358,12 @@ pub(crate) fn needed(simpler: &State, state: &State) -> bool {
 fn acceptable(engine: &Engine<'_>, r: &Refit, before: &State, number: usize) -> bool {
     let least_size = match (engine.usual(r.effect), r.effect.spec().parameters) {
         (Some(usual), [first, ..]) => thresholds::LEAST_OVER_USUAL * usual / engine.size(first),
+        _ if r.effect.is_of_a_place() => thresholds::LEAST_PLACE_SIZE,
         _ => thresholds::LEAST_SIZE,
     };
     let residuals = before.residuals();
     let remaining = (before.cost - thresholds::NOISE_COST * residuals).max(0.05 * before.cost);
-    let least_z =
-        if r.effect == EffectId::LowGripPatch { thresholds::LEAST_PLACE_Z } else { thresholds::LEAST_Z };
+    let least_z = if r.effect.is_of_a_place() { thresholds::LEAST_PLACE_Z } else { thresholds::LEAST_Z };
     r.z > least_z
         && r.relative_size < thresholds::MOST_SIZE
         && r.gain > thresholds::LEAST_GAIN * residuals

@@ -24,19 +24,7 @@ pub(crate) fn sizes(
 ) -> BTreeMap<&'static str, EffectParameter> {
     let spec = effect.spec();
     let Some(own) = state.of(effect) else { return BTreeMap::new() };
-    let from = BASE
-        + state
-            .effects
-            .iter()
-            .take_while(|e| **e != effect)
-            .map(|e| e.spec().parameters.len())
-            .sum::<usize>();
-    let halves: Vec<f64> = (0..own.len())
-        .map(|i| {
-            let error = standard_error(state, from, from + i, own.len(), blocks);
-            NINETY * (WIDER * error).hypot(SHARE * (own[i] - spec.parameters[i].null))
-        })
-        .collect();
+    let halves = half_widths(state, effect, own, blocks);
     if spec.reported.is_empty() {
         return spec
             .parameters
@@ -63,6 +51,38 @@ pub(crate) fn sizes(
                 }
             }
             (r.name, EffectParameter { value, low, high, unit: r.unit })
+        })
+        .collect()
+}
+
+/// Whether a size is told by the data: one at least of the parameters that size the effect has an interval without the value at which it is
+/// `absent`, and none is held by its bound. What sits in one part of the lap is in few blocks: their scatter says nothing.
+pub(crate) fn is_told(state: &State, effect: EffectId, absent: &[f64], blocks: &[usize]) -> bool {
+    let Some(own) = state.of(effect) else { return false };
+    let halves = half_widths(state, effect, own, blocks);
+    let from = first_row(state, effect);
+    let sizing = effect.sizing();
+    let away = |i: usize| own[i] - absent[i];
+    let held = |i: usize| {
+        state.fit.as_ref().is_some_and(|f| f.on_bound.contains(&(from + i))) && away(i).abs() > 1e-9
+    };
+    let told = effect.is_of_a_place() || (0..sizing).any(|i| away(i).abs() > halves[i]);
+    told && !(0..sizing).any(held)
+}
+
+/// Place of an effect's first parameter in a state.
+fn first_row(state: &State, effect: EffectId) -> usize {
+    let before = state.effects.iter().take_while(|e| **e != effect);
+    BASE + before.map(|e| e.spec().parameters.len()).sum::<usize>()
+}
+
+/// Half widths of the 90 % intervals of an effect's parameters.
+fn half_widths(state: &State, effect: EffectId, own: &[f64], blocks: &[usize]) -> Vec<f64> {
+    let from = first_row(state, effect);
+    (0..own.len())
+        .map(|i| {
+            let error = standard_error(state, from, from + i, own.len(), blocks);
+            NINETY * (WIDER * error).hypot(SHARE * (own[i] - effect.spec().parameters[i].null))
         })
         .collect()
 }

@@ -2,6 +2,8 @@
 
 use gripsight_signals::Segment;
 
+use crate::smooth::median;
+
 /// Laps of a recording.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Laps {
@@ -11,23 +13,33 @@ pub(crate) struct Laps {
     pub(crate) lap_m: f64,
     /// Laps driven.
     pub(crate) laps: f64,
+    /// The first closed lap, point by point: x, y, heading.
+    ruler: Vec<(f64, f64, f64)>,
 }
 
 /// A lap turns the car by a full turn and brings it back to within this share of the way driven since.
 const CLOSE_SHARE: f64 = 0.03;
 /// How far ahead of the last place the next is looked for, over the lap.
 const LOOK_AHEAD_SHARE: f64 = 0.1;
+/// A drive that is further off another one's lap, over the lap, is on another course.
+const OTHER_COURSE_SHARE: f64 = 0.02;
 
-/// Finds laps and places. Without a pose, or without a closed lap, the places are all 0.
-pub(crate) fn stations(segments: &[Segment]) -> Laps {
+/// Finds laps and places. Without a pose, or without a closed lap, the places are all 0. With `known` laps of another drive over the same
+/// course, places are theirs.
+pub(crate) fn stations(segments: &[Segment], known: Option<&Laps>) -> Laps {
     let none = || Laps { share: segments.iter().map(|s| vec![0.0; s.len()]).collect(), ..Laps::default() };
     if segments.iter().any(|s| s.x_m.is_empty() || s.yaw_rad.is_empty()) {
         return none();
     }
     let points: Vec<(f64, f64, f64)> =
         segments.iter().flat_map(|s| (0..s.len()).map(|k| (s.x_m[k], s.y_m[k], s.yaw_rad[k]))).collect();
-    let Some((from, to)) = first_lap(&points) else { return none() };
-    let ruler = &points[from..=to];
+    let ruler: &[_] = match known.map(|k| &k.ruler) {
+        Some(ruler) => ruler,
+        None => first_lap(&points).map_or(&[], |(from, to)| &points[from..=to]),
+    };
+    if ruler.is_empty() {
+        return none();
+    }
     let mut along = vec![0.0];
     for w in ruler.windows(2) {
         along.push(along[along.len() - 1] + (w[1].0 - w[0].0).hypot(w[1].1 - w[0].1));
@@ -35,6 +47,7 @@ pub(crate) fn stations(segments: &[Segment]) -> Laps {
     let lap_m = along[along.len() - 1];
     let driven: f64 = points.windows(2).map(|w| (w[1].0 - w[0].0).hypot(w[1].1 - w[0].1)).sum();
     let mut near: Option<usize> = None;
+    let mut off_m = Vec::with_capacity(points.len());
     let share = segments
         .iter()
         .map(|s| {
@@ -42,12 +55,16 @@ pub(crate) fn stations(segments: &[Segment]) -> Laps {
                 .map(|k| {
                     let place = nearest(ruler, s.x_m[k], s.y_m[k], near);
                     near = Some(place);
+                    off_m.push((ruler[place].0 - s.x_m[k]).hypot(ruler[place].1 - s.y_m[k]));
                     along[place] / lap_m
                 })
                 .collect()
         })
         .collect();
-    Laps { share, lap_m, laps: driven / lap_m }
+    if known.is_some() && median(off_m) > OTHER_COURSE_SHARE * lap_m {
+        return stations(segments, None);
+    }
+    Laps { share, lap_m, laps: driven / lap_m, ruler: ruler.to_vec() }
 }
 
 /// First and last sample of the first closed lap: the heading has turned by a whole turn, and the car is back.
@@ -100,7 +117,7 @@ mod tests {
             yaw_rad: (0..n).map(|k| turn(k) + 1.57).collect(),
             ..Segment::default()
         };
-        let laps = stations(&[segment]);
+        let laps = stations(&[segment], None);
         approx::assert_relative_eq!(laps.lap_m, 62.8, max_relative = 0.01);
         for k in (0..n).step_by(50) {
             let expected = (turn(k) / std::f64::consts::TAU).fract();

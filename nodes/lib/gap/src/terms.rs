@@ -119,6 +119,8 @@ pub struct Moment<T> {
     pub lap_share: f64,
     /// Length of the lap; 0 without laps.
     pub lap_m: f64,
+    /// Where on the course, as an angle that comes round once a lap: of the distance along the lap, without laps the heading.
+    pub place_rad: f64,
 }
 
 /// Accelerations from outside the tires.

@@ -4,7 +4,7 @@ use gripsight_signals::DataHealth;
 use gripsight_vehicle::PacejkaParameters;
 
 use crate::noise::spread;
-use crate::outcome::{Diagnosis, GapBudget, Series, TirePair, Verdict, Where};
+use crate::outcome::{Diagnosis, GapBudget, Series, TirePair, Unexplained, Verdict, Where};
 use crate::recording::Recording;
 use crate::windows::{HORIZON_S, NEEDED_S, Split, split};
 use crate::{Estimate, ExtendedModelFile, GapError, Request};
@@ -84,6 +84,7 @@ pub(crate) fn refused(request: &Request<'_>, error: &GapError, data_health: Data
         drive_next: vec![next.to_owned()],
         looks: Vec::new(),
         search_costs: Vec::new(),
+        unexplained: Unexplained::default(),
         series: Series::default(),
     }
 }

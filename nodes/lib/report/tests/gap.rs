@@ -6,8 +6,8 @@
 use std::collections::BTreeMap;
 
 use gripsight_gap::{
-    Diagnosis, EffectParameter, ExtendedModelFile, Estimate, GapBudget, Identity, Invisible, Place, Prediction, RankedEffect,
-    Series, TirePair, Verdict, Where,
+    Diagnosis, EffectParameter, Estimate, ExtendedModelFile, GapBudget, Identity, Invisible, Place,
+    Prediction, RankedEffect, Series, TirePair, Unexplained, Verdict, Where,
 };
 use gripsight_report::{GapInput, Header, gap_page};
 use gripsight_signals::DataHealth;
@@ -103,6 +103,7 @@ fn diagnosis() -> Diagnosis {
         drive_next: vec!["to tell steering_delay from steering_lag: steering to 3 Hz".into()],
         looks: Vec::new(),
         search_costs: Vec::new(),
+        unexplained: Unexplained::default(),
         series: Series {
             tire_curves: [curve(0.5).collect(), curve(0.45).collect()],
             slip_driven_rad: [0.16, 0.12],

@@ -244,6 +244,16 @@ impl EffectId {
         })
     }
 
+    /// Whether it sits in one part of the lap.
+    pub(crate) fn is_of_a_place(self) -> bool {
+        matches!(self, Self::LowGripPatch | Self::RoadBank | Self::RoadSlope)
+    }
+
+    /// How many of its parameters, the first ones, size it; later ones only place it.
+    pub(crate) fn sizing(self) -> usize {
+        if self == Self::LowGripPatch { 1 } else { self.spec().parameters.len() }
+    }
+
     /// Canonical name.
     #[must_use]
     pub const fn name(self) -> &'static str {

@@ -1,6 +1,5 @@
-//! Effects of the road's shape. Over a lap the angle is its mean and the first harmonic of the distance.
-
-use std::f64::consts::TAU;
+//! Effects of the road's shape. Over a lap the angle is its mean and the first harmonic of the distance; where no lap was closed, of the
+//! heading, as on a tilted plane.
 
 use gripsight_vehicle::{GRAVITY_MPS2, Real};
 
@@ -8,13 +7,9 @@ use super::loads::COMMAND;
 use super::{Effect, EffectSpec, Reported, both_sides, spec};
 use crate::terms::{Axles, Car, Moment, Motion};
 
-/// The angle at a place of the lap.
-fn angle<T: Real>(p: &[T], lap_share: f64, lap_m: f64) -> T {
-    if lap_m <= 0.0 {
-        return p[0];
-    }
-    let turn = TAU * lap_share;
-    p[0] + p[1] * turn.cos() + p[2] * turn.sin()
+/// The angle at a place.
+fn angle<T: Real>(p: &[T], at: &Moment<T>) -> T {
+    p[0] + p[1] * at.place_rad.cos() + p[2] * at.place_rad.sin()
 }
 
 /// The largest angle of the lap, with its sign.
@@ -49,7 +44,7 @@ impl Effect for RoadBank {
     };
 
     fn loads<T: Real>(p: &[T], _car: &Car<T>, at: &Moment<T>, axles: &mut Axles<T>) {
-        let (sin, cos) = angle(p, at.lap_share, at.lap_m).sin_cos();
+        let (sin, cos) = angle(p, at).sin_cos();
         let into_road = cos - at.v_x_mps * at.yaw_rate_radps * sin / GRAVITY_MPS2;
         let into_road = if into_road.re() < 0.1 { T::from(0.1) } else { into_road };
         axles.front.load_n *= into_road;
@@ -57,7 +52,7 @@ impl Effect for RoadBank {
     }
 
     fn motion<T: Real>(p: &[T], _car: &Car<T>, at: &Moment<T>, motion: &mut Motion<T>) {
-        motion.gravity_y_mps2 -= angle(p, at.lap_share, at.lap_m).sin() * GRAVITY_MPS2;
+        motion.gravity_y_mps2 -= angle(p, at).sin() * GRAVITY_MPS2;
     }
 }
 
@@ -83,6 +78,6 @@ impl Effect for RoadSlope {
     };
 
     fn motion<T: Real>(p: &[T], _car: &Car<T>, at: &Moment<T>, motion: &mut Motion<T>) {
-        motion.gravity_x_mps2 -= angle(p, at.lap_share, at.lap_m).sin() * GRAVITY_MPS2;
+        motion.gravity_x_mps2 -= angle(p, at).sin() * GRAVITY_MPS2;
     }
 }
