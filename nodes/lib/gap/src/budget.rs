@@ -6,8 +6,10 @@ use crate::effects::EffectId;
 use crate::engine::{Engine, Nominal, State};
 use crate::evaluate::{Estimate, bootstrap, by_block, interval, mean, of_picked};
 use crate::flexible::{Flexible, Room};
+use crate::model::ExtendedModel;
 use crate::outcome::GapBudget;
 use crate::recording::Recording;
+use crate::residual::Residual;
 use crate::select::Round;
 use crate::windows::{HORIZON_S, Split, Windows, of_length, split};
 
@@ -18,6 +20,8 @@ pub(crate) struct Budget {
     /// Retuned tires, then with one effect after the other.
     pub(crate) steps: Vec<Vec<(f64, f64)>>,
     pub(crate) ceiling: Vec<(f64, f64)>,
+    /// Retuned tires and a residual network; nothing where it could not be trained.
+    residual: Option<Vec<(f64, f64)>>,
     pub(crate) floor: Estimate,
     pub(crate) closed: Estimate,
     pub(crate) scored_on: &'static str,
@@ -93,6 +97,10 @@ impl Budget {
         let slip = large_slip_rad(engine, null, &windows.training);
         let flexible = Flexible::new(engine.recording, slip, engine.vehicle.wheelbase_m(), &Room::ALL);
         let ceiling = engine.fit_flexible(state, &flexible, &windows.training);
+        let residual = Residual::learned(engine, null, &windows.training).map(|residual| {
+            let model = ExtendedModel { residual: Some(&residual), ..scorer.model(&null.effects, None) };
+            by_block(scorer.recording, &on, &scorer.score_model(&model, &null.parameters, &on))
+        });
         let whole = match steps.last() {
             Some(last) if steps.len() > 1 => closed(&retuned, last, &retuned),
             _ => Estimate::default(),
@@ -100,6 +108,7 @@ impl Budget {
         Self {
             nominal: blocks(&nominal.effects, None, &nominal.parameters),
             ceiling: blocks(&state.effects, Some(&flexible), &ceiling),
+            residual,
             steps,
             // By construction of the noise's figure the floor is 1.
             floor: Estimate { value: 1.0, low: 1.0, high: 1.0 },
@@ -146,6 +155,7 @@ impl Budget {
             retuned: self.steps.first().map_or(Estimate::UNKNOWN, |b| interval(b)),
             after,
             unstructured_ceiling: if ceiling.value > after.value { after } else { ceiling },
+            s4_residual: self.residual.as_deref().map_or(Estimate::UNKNOWN, interval),
             noise_floor: self.floor,
             horizon_s: HORIZON_S,
             channel_noise,

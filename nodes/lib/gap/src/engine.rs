@@ -416,7 +416,11 @@ impl<'a> Engine<'a> {
         values: &[f64],
         windows: &Windows,
     ) -> Score {
-        let model = self.model(effects, flexible);
+        self.score_model(&self.model(effects, flexible), values, windows)
+    }
+
+    /// [`Self::score`] of a model at hand.
+    pub(crate) fn score_model(&self, model: &ExtendedModel<'_>, values: &[f64], windows: &Windows) -> Score {
         let parameters: Vec<Parameter> = values
             .iter()
             .map(|&start| Parameter {
@@ -428,7 +432,7 @@ impl<'a> Engine<'a> {
             })
             .collect();
         let problem = Problem {
-            model: &model,
+            model,
             windows: &windows.windows,
             sigma: &self.recording.sigma,
             parameters: &parameters,

@@ -15,7 +15,8 @@
 //!    that is the cause leaves them nothing; a stand-in does, and its confidence falls. Below even odds an effect is a candidate, not a
 //!    name. Where nothing is named, what the rooms explain tells "none of these" from a retune.
 //! 5. Open-loop rollouts of 1 s on held-out blocks (or another bag): nominal, retuned, with the effects, with all free terms on top (the
-//!    ceiling), against the noise. Effects that reach too little of the ceiling are not named.
+//!    ceiling), with the residual network of `gripsight_s4` in place of effects, against the noise. Effects that reach too little of the ceiling
+//!    are not named.
 //!
 //! Intervals of sizes use blocks of 4 s as clusters and add a share of the size for errors of the model that all blocks share; that
 //! share, and all thresholds (`select::thresholds`, `verdict`), were fixed on development drives of the reference car.
@@ -64,6 +65,7 @@ mod outcome;
 mod pictures;
 mod place;
 mod recording;
+mod residual;
 mod rooms;
 mod screen;
 mod search;

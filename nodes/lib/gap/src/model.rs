@@ -11,6 +11,7 @@ use crate::effects::EffectId;
 use crate::flexible::Flexible;
 use crate::motion::Mover;
 use crate::recording::{Channel, Recording};
+use crate::residual::Residual;
 use crate::terms::{Car, Outputs, delayed};
 
 /// Parameters of the tires.
@@ -30,6 +31,7 @@ pub(crate) struct ExtendedModel<'a> {
     pub(crate) vehicle: &'a VehicleParameters,
     pub(crate) effects: Vec<EffectId>,
     pub(crate) flexible: Option<Flexible>,
+    pub(crate) residual: Option<&'a Residual>,
     pub(crate) substep_s: f64,
 }
 
@@ -53,7 +55,7 @@ impl<'a> ExtendedModel<'a> {
         effects: &[EffectId],
         substep_s: f64,
     ) -> Self {
-        Self { recording, vehicle, effects: effects.to_vec(), flexible: None, substep_s }
+        Self { recording, vehicle, effects: effects.to_vec(), flexible: None, residual: None, substep_s }
     }
 
     /// Each effect with its parameters.
@@ -155,6 +157,17 @@ impl<'a> ExtendedModel<'a> {
 
     /// The motion over a window, as recorded by its sensors.
     pub(crate) fn predict<T: Real>(&self, p: &[T], start: [T; 2], window: &Window) -> Outputs<T> {
+        self.predict_pushed(p, start, [T::from(0.0); 2], window)
+    }
+
+    /// The same with accelerations of v_y and yaw rate added throughout.
+    pub(crate) fn predict_pushed<T: Real>(
+        &self,
+        p: &[T],
+        start: [T; 2],
+        push: [T; 2],
+        window: &Window,
+    ) -> Outputs<T> {
         let tires = tires_from_parameters(&p[..TIRES]);
         let mut car = Car::nominal(self.vehicle, [tires.front.d, tires.rear.d]);
         for (effect, values) in self.with_parameters(p) {
@@ -162,7 +175,7 @@ impl<'a> ExtendedModel<'a> {
         }
         let (steering, run_in) = self.road_wheel_angles(p, window);
         let (before, steering) = steering.split_at(run_in);
-        let mover = Mover { model: self, p, car, tires, before, steering, window };
+        let mover = Mover { model: self, p, car, tires, before, steering, window, push };
         let mut outputs = mover.run(start);
         let shift = car.cog_shift_m;
         for k in 0..outputs.v_y_mps.len() {

@@ -26,6 +26,8 @@ pub(crate) struct Mover<'m, 'a, T> {
     /// Road-wheel angles in the window.
     pub(crate) steering: &'m [T],
     pub(crate) window: &'m Window,
+    /// Accelerations of v_y and yaw rate that are added throughout.
+    pub(crate) push: [T; 2],
 }
 
 /// The inputs of an instant.
@@ -39,6 +41,7 @@ struct Instant<T> {
     place_rad: f64,
     /// The sample before it.
     sample: usize,
+    push: [T; 2],
 }
 
 /// What an instant leaves behind for the next.
@@ -82,8 +85,13 @@ impl<T: Real> Mover<'_, '_, T> {
         };
         let mut x = start;
         let (mut speed, mut heading) = (zero, zero);
+        let mut residual = self.model.residual.map(|r| r.stream(run, self.window));
+        let mut push = self.push;
         let mut rates = self.settled(x, h_s);
         for k in 0..n {
+            if let Some(stream) = &mut residual {
+                push = stream.next(k, [x[0].re(), x[1].re()]).map(T::from);
+            }
             out.v_y_mps.push(x[0]);
             out.yaw_rate_radps.push(x[1]);
             out.yaw_acceleration_radps2.push(rates.yaw_radps2);
@@ -95,13 +103,13 @@ impl<T: Real> Mover<'_, '_, T> {
                 break;
             }
             for i in 0..substeps as usize {
-                let middle = self.instant(k, (i as f64 + 0.5) / substeps);
+                let middle = Instant { push, ..self.instant(k, (i as f64 + 0.5) / substeps) };
                 let half = [x[0] + rates.v_y_mps2 * (h_s / 2.0), x[1] + rates.yaw_radps2 * (h_s / 2.0)];
                 let there = self.rates(half, &middle, &rates.memory, h_s / 2.0);
                 x = [x[0] + there.v_y_mps2 * h_s, x[1] + there.yaw_radps2 * h_s];
                 speed += there.v_x_mps2 * h_s;
                 heading += half[1] * h_s;
-                let end = self.instant(k, (i as f64 + 1.0) / substeps);
+                let end = Instant { push, ..self.instant(k, (i as f64 + 1.0) / substeps) };
                 rates = self.rates(x, &end, &rates.memory, h_s);
             }
         }
@@ -182,6 +190,7 @@ impl<T: Real> Mover<'_, '_, T> {
             lap_share: lap[a] + (turn - turn.round()) * share,
             place_rad: run.place_rad[a],
             sample: a,
+            push: self.push,
         }
     }
 
@@ -250,9 +259,10 @@ impl<T: Real> Mover<'_, '_, T> {
             0.0
         };
         let front_y_n = if commanded { front_n * cos + sin * front_x_n } else { front_n * cos };
-        let mut a_y = (rear_n + front_y_n) / car.mass_kg + motion.force_y_mps2;
-        let mut yaw_radps2 =
-            (front_y_n * car.l_f_m - rear_n * car.l_r_m) / car.yaw_inertia_kgm2 + motion.yaw_radps2;
+        let mut a_y = (rear_n + front_y_n) / car.mass_kg + motion.force_y_mps2 + now.push[0];
+        let mut yaw_radps2 = (front_y_n * car.l_f_m - rear_n * car.l_r_m) / car.yaw_inertia_kgm2
+            + motion.yaw_radps2
+            + now.push[1];
         if let Some(flexible) = &model.flexible {
             let own = model.flexible_parameters(self.p);
             let rate = |i: usize| {

@@ -143,6 +143,9 @@ pub struct GapBudget {
     pub after: Estimate,
     /// With flexible terms on top.
     pub unstructured_ceiling: Estimate,
+    /// With the residual network of `gripsight_s4` on top of the retuned tires, in place of effects: what a black box closes without a name.
+    /// Unknown (`null`) where it could not be trained.
+    pub s4_residual: Estimate,
     /// What the noise alone leaves.
     pub noise_floor: Estimate,
     /// Length of the rollouts.

@@ -42,6 +42,7 @@ impl Diagnosis {
             ("retuned", gap.retuned),
             ("after", gap.after),
             ("ceiling", gap.unstructured_ceiling),
+            ("S4", gap.s4_residual),
             ("noise", gap.noise_floor),
         ] {
             let _ = writeln!(out, "  {name:<9}{}", figure(e));

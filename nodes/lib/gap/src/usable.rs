@@ -72,6 +72,7 @@ pub(crate) fn refused(request: &Request<'_>, error: &GapError, data_health: Data
             retuned: unknown,
             after: unknown,
             unstructured_ceiling: unknown,
+            s4_residual: unknown,
             noise_floor: unknown,
             horizon_s: HORIZON_S,
             channel_noise: std::collections::BTreeMap::new(),

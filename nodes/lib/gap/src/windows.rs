@@ -37,6 +37,13 @@ impl Windows {
         Self { windows, block }
     }
 
+    /// Those of some blocks.
+    pub(crate) fn of_blocks(&self, wanted: impl Fn(usize) -> bool) -> Self {
+        let kept = self.windows.iter().zip(&self.block).filter(|(_, b)| wanted(**b));
+        let (windows, block) = kept.map(|(w, b)| (*w, *b)).unzip();
+        Self { windows, block }
+    }
+
     /// Time covered.
     pub(crate) fn duration_s(&self, dt_s: f64) -> f64 {
         self.windows.iter().map(|w| w.len as f64 * dt_s).sum()

@@ -82,6 +82,7 @@ fn diagnosis() -> Diagnosis {
             retuned: estimate(8.0, 1.5),
             after: estimate(3.1, 0.5),
             unstructured_ceiling: estimate(2.4, 0.4),
+            s4_residual: estimate(4.2, 0.6),
             noise_floor: estimate(1.0, 0.0),
             horizon_s: 0.5,
             channel_noise: BTreeMap::from([("v_y", 0.01), ("yaw_rate", 0.03)]),

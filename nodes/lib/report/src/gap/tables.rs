@@ -40,14 +40,18 @@ pub(super) fn budget(d: &Diagnosis) -> Markup {
     }
     rows.push(part("unexplained rest".into(), Role::Nominal, g.after.value, g.noise_floor.value));
     rows.push(total("Noise", Role::Measured, &g.noise_floor));
-    let ceiling = &g.unstructured_ceiling;
+    let (ceiling, black_box) = (&g.unstructured_ceiling, &g.s4_residual);
     html! {
         (bars(&rows))
         p {
             "Mean squared error of open-loop rollouts of " (significant(g.horizon_s, 2)) " s on " (g.scored_on)
             ", each channel over its noise (" (noise(d)) "); the thin line is the 90 % interval by block bootstrap. "
             "Flexible terms without any physics reach " (significant(ceiling.value, 3))
-            " (" (interval(ceiling.low, ceiling.high)) "): less than that no effect can be expected to leave."
+            " (" (interval(ceiling.low, ceiling.high)) "): less than that no effect can be expected to leave. "
+            @if black_box.value.is_finite() {
+                "The S4 residual network on top of the other tires, a black box that names nothing, leaves " (significant(black_box.value, 3))
+                " (" (interval(black_box.low, black_box.high)) ")."
+            }
         }
     }
 }
