@@ -115,7 +115,14 @@ pub(crate) fn conclude(run: &Identification, converged: bool) -> Outcome {
         .into_iter()
         .zip(over(&after))
         .enumerate()
-        .map(|(k, (before, after))| HorizonError { horizon_s: k as f64 * run.data.dt_s, before, after })
+        .map(|(k, (before, after))| {
+            let change = |c: usize| Change { before: before[c], after: after[c] };
+            HorizonError {
+                horizon_s: k as f64 * run.data.dt_s,
+                v_y_mps: change(0),
+                yaw_rate_radps: change(1),
+            }
+        })
         .collect();
     let slips = PerAxle { front: run.direct.slips.front.range_rad, rear: run.direct.slips.rear.range_rad };
     let (key, request_initial) = (run.candidate.key.clone(), run.initial);

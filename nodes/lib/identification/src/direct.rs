@@ -5,7 +5,7 @@
 //!    which no simple model gets right, stays out of them.
 //! 2. All parameters on all windows. Gain and lever arm are freed only where that is worth it: at nearly one speed they are the stiffnesses in
 //!    disguise.
-//! 3. An axle whose peak the data do not reach gets its D from the friction prior, and step 2 is repeated with it.
+//! 3. An axle whose peak the data do not reach gets its D from the friction prior, and step 2 is repeated with it; unless the data contradict it.
 //!
 //! Which is identifiable from what: the yaw rate's bias from the heading alone (fixed then); delay from transients; offset and bias of v_y from driving
 //! straight; gain (against K_f) and lever arm (against K_r) from a range of speeds, and from nothing else. Every one has a prior.
@@ -42,6 +42,9 @@ const FIRST_CORRELATION: f64 = 10.0;
 /// Step 1 looks at windows below this share of the largest lateral acceleration, and needs so many of them.
 const LOW_SHARE: f64 = 0.5;
 const LOW_WINDOWS: usize = 12;
+
+/// A friction prior contradicts the data where holding D at it raises what the windows miss by more than this: three standard errors.
+const CONTRADICTION: f64 = 9.0;
 
 /// Result of the direct fit.
 #[derive(Debug, Clone)]
@@ -100,18 +103,27 @@ pub(crate) fn direct(
     let (mut all, mut found, weights) = fitter.refine(&all, weights);
 
     let (slips, _) = fitter.visited(&found);
-    let peak = PerAxle { front: evidence(&found, 0, &slips.front), rear: evidence(&found, 4, &slips.rear) };
+    let mut peak =
+        PerAxle { front: evidence(&found, 0, &slips.front), rear: evidence(&found, 4, &slips.rear) };
     if let Some(prior) = prior.filter(|_| !(peak.front.reached && peak.rear.reached)) {
-        restart(&mut all, &found.parameters);
+        let mut held = all.clone();
+        restart(&mut held, &found.parameters);
         for (offset, axle) in [(0, &peak.front), (4, &peak.rear)] {
             if axle.is_the_priors(Some(prior)) {
-                all[offset + 2].free = false;
-                all[offset + 2].start = prior.mu;
-                all[offset + 1].start = C_PRIOR.mean;
-                all[offset + 3].start = E_PRIOR.mean;
+                held[offset + 2].free = false;
+                held[offset + 2].start = prior.mu;
+                held[offset + 1].start = C_PRIOR.mean;
+                held[offset + 3].start = E_PRIOR.mean;
             }
         }
-        found = fitter.solve(&all, &fitter.training, &weights.sigma, 30);
+        let with_it = fitter.solve(&held, &fitter.training, &weights.sigma, 30);
+        let misfit = |fit: &Fit| fit.linearization.window_costs.iter().sum::<f64>();
+        if misfit(&with_it) - misfit(&found) > CONTRADICTION {
+            peak.front.contradicts_prior = true;
+            peak.rear.contradicts_prior = true;
+        } else {
+            (all, found) = (held, with_it);
+        }
     }
     if found.stop == StopReason::NotFinite || found.parameters.iter().any(|v| !v.is_finite()) {
         return Err(IdentificationError::NotFinite { what: "direct fit" });

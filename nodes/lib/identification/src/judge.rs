@@ -91,8 +91,8 @@ pub(crate) fn one_step_errors(
     Errors::of(squares, samples, noise)
 }
 
-/// Mean square error, channels divided by their noise, at each sample after the start of rollouts of `len` samples that begin where the windows
-/// begin, from given starts. Windows whose stretch ends before are left out.
+/// Root mean square errors of v_y (m/s) and yaw rate (rad/s) at each sample after the start of rollouts of `len` samples that begin where the
+/// windows begin, from given starts. Windows whose stretch ends before are left out.
 pub(crate) fn errors_over_horizon(
     model: &TireRollout<'_>,
     data: &Data,
@@ -100,9 +100,9 @@ pub(crate) fn errors_over_horizon(
     windows: &[Window],
     starts: &[[f64; 2]],
     len: usize,
-) -> Vec<f64> {
+) -> Vec<[f64; 2]> {
     let (mut predicted, mut measured) = (Vec::new(), Vec::new());
-    let mut squares = vec![0.0; len];
+    let mut squares = vec![[0.0; 2]; len];
     let mut counted = 0;
     for (window, start) in windows.iter().zip(starts) {
         let inside = data.stretches.iter().any(|s| {
@@ -116,8 +116,8 @@ pub(crate) fn errors_over_horizon(
         model.measured(&long, &mut measured);
         counted += 1;
         for (i, (a, b)) in predicted.iter().zip(&measured).enumerate() {
-            squares[i / 2] += 0.5 * ((a - b) / data.noise[i % 2]).powi(2);
+            squares[i / 2][i % 2] += (a - b).powi(2);
         }
     }
-    squares.iter().map(|s| (s / f64::from(counted.max(1))).sqrt()).collect()
+    squares.iter().map(|s| s.map(|s| (s / f64::from(counted.max(1))).sqrt())).collect()
 }

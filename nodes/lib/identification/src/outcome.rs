@@ -100,15 +100,15 @@ pub struct RmseReport {
     pub noise: [f64; 2],
 }
 
-/// Error of open-loop rollouts at a time after their start, on held-out data; channels divided by their noise.
+/// Root mean square error of open-loop rollouts at a time after their start, on held-out data: what [`Rmse`] averages over a window.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct HorizonError {
     /// After the start.
     pub horizon_s: f64,
-    /// With the initial tires.
-    pub before: f64,
-    /// With the tires identified.
-    pub after: f64,
+    /// Lateral velocity, m/s.
+    pub v_y_mps: Change,
+    /// Yaw rate, rad/s.
+    pub yaw_rate_radps: Change,
 }
 
 /// One turn of the outer loop.

@@ -10,6 +10,8 @@ use crate::{Estimate, Identification, PerAxle, TireCurve, Trace};
 
 /// Points of a curve.
 const POINTS: usize = 60;
+/// They lie closer where the curve bends: at (k/59)^1.5 of its end.
+const SPACING: f64 = 1.5;
 /// A curve is drawn this much beyond the slips driven, at least to a slip of 0.2 rad.
 const BEYOND: f64 = 1.5;
 const AT_LEAST_RAD: f64 = 0.2;
@@ -31,11 +33,13 @@ fn curve(
     offset: usize,
 ) -> TireCurve {
     let furthest = slips.range_rad.low.abs().max(slips.range_rad.high.abs());
-    let step = (BEYOND * furthest).max(AT_LEAST_RAD) / (POINTS - 1) as f64;
-    let slip_rad: Vec<f64> = (0..POINTS).map(|k| k as f64 * step).collect();
+    let end_rad = (BEYOND * furthest).max(AT_LEAST_RAD);
+    let last = (POINTS - 1) as f64;
+    let slip_rad: Vec<f64> = (0..POINTS).map(|k| end_rad * (k as f64 / last).powf(SPACING)).collect();
     let mut density = vec![0; POINTS];
     for slip in &slips.samples_rad {
-        if let Some(count) = density.get_mut((slip.abs() / step) as usize) {
+        let after = slip_rad.partition_point(|&from| from <= slip.abs());
+        if let Some(count) = after.checked_sub(1).and_then(|bin| density.get_mut(bin)) {
             *count += 1;
         }
     }

@@ -4,7 +4,7 @@
 //! | | paper | robust |
 //! | --- | --- | --- |
 //! | speed | the mean of the run | the mean, raised until the front tires can saturate within the steering's range, within the speeds driven |
-//! | ramp | 0 to 0.4 rad in 10 s, to the left, until a slip leaves the hull of the data | until a slip is well outside the hull, 100 time constants long, both ways |
+//! | ramp | 0 to 0.4 rad in 10 s, both ways, until a slip leaves the hull of the data | until a slip is well outside the hull, 100 time constants long, both ways |
 //! | forces | steady state, m l/L v_x w | inverse dynamics with dv_y/dt and dw/dt |
 //! | residual outside the slips trained on | not asked | faded out over a quarter of their range |
 //!
@@ -75,8 +75,7 @@ pub(crate) fn sweep(
     };
     let mut points = PerAxle { front: Vec::new(), rear: Vec::new() };
     let (mut outside, mut samples) = (0, 0);
-    let directions: &[f64] = if method == Method::Paper { &[1.0] } else { &[1.0, -1.0] };
-    for &direction in directions {
+    for direction in [1.0, -1.0] {
         let (o, n) = test.ramp(direction, &mut points)?;
         outside += o;
         samples += n;

@@ -86,8 +86,8 @@ fn outcome() -> Outcome {
             .map(|k| f64::from(k) * 0.1)
             .map(|horizon_s| HorizonError {
                 horizon_s,
-                before: 1.0 + 6.0 * horizon_s,
-                after: 1.0 + horizon_s,
+                v_y_mps: Change { before: 0.01 + 0.06 * horizon_s, after: 0.01 + 0.01 * horizon_s },
+                yaw_rate_radps: Change { before: 0.02 + 0.12 * horizon_s, after: 0.02 + 0.02 * horizon_s },
             })
             .collect(),
         source: Source::ResidualLoop,

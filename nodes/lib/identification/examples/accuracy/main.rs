@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! accuracy plants FOLDER...                the reference car's test drives, and bag folders with `truth_axle_forces.csv`
-//! accuracy draws FROM TO DURATION_S        drives drawn from seeds: what intervals, and claims of a peak, are worth
+//! accuracy draws FROM TO DURATION_S [OFF]  drives drawn from seeds: what intervals, and claims of a peak, are worth; with a prior OFF from the road's mu
 //! accuracy robustness                      one drive under worse and worse recording, and from other starts and priors
 //! ```
 //!
@@ -128,14 +128,17 @@ fn main() -> Result<()> {
                 println!("{}", row(&run, PLAIN, None, &Config::default())?);
             }
         }
-        ("draws", [from, to, duration_s]) => {
+        ("draws", [from, to, duration_s, off @ ..]) => {
+            let off = off.first().map(|off| off.parse::<f64>()).transpose()?;
             let config = Config { residual: ResidualKind::None, ..Config::default() };
             for seed in from.parse()?..to.parse()? {
                 let case = cases::draw(seed, duration_s.parse()?)?;
+                let road = case.scenario.friction.nominal();
+                let prior = off.map(|off| FrictionPrior { mu: (road + off).max(0.1), sigma: 0.1 });
                 let (recording, sequence, vehicle) = reference::drive(case.scenario);
                 let truth = truth_of(&recording, &vehicle);
                 let run = Run { name: case.name, vehicle, sequence, truth };
-                println!("{}", row(&run, case.signals, None, &config)?);
+                println!("{}", row(&run, case.signals, prior, &config)?);
             }
         }
         ("robustness", []) => robustness::run()?,

@@ -1,5 +1,7 @@
 //! What the examples share: runs with their truth, and the score against it.
 
+pub(crate) mod picture;
+
 use std::path::Path;
 
 use anyhow::{Context, Result};

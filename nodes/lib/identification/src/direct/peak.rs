@@ -18,12 +18,14 @@ pub(crate) struct PeakEvidence {
     pub(crate) above: f64,
     /// Largest F_y/F_z within the slips visited.
     pub(crate) height: f64,
+    /// Whether the data fit much worse with the friction prior's D than without.
+    pub(crate) contradicts_prior: bool,
 }
 
 impl PeakEvidence {
-    /// Whether D is the friction prior's: the data do not show the peak, and the prior is not below what they do show.
+    /// Whether D is the friction prior's: the data do not show the peak, and the prior is neither below what they do show nor against them.
     pub(crate) fn is_the_priors(&self, prior: Option<FrictionPrior>) -> bool {
-        !self.reached && prior.is_some_and(|p| p.mu >= self.height)
+        !self.reached && !self.contradicts_prior && prior.is_some_and(|p| p.mu >= self.height)
     }
 }
 
@@ -53,7 +55,7 @@ pub(super) fn evidence(fit: &Fit, offset: usize, slips: &Slips) -> PeakEvidence 
         && furthest > LEAST_PEAK_SLIP_RAD
         && axle.normalized_stiffness() * furthest > PEAK_EXCESS * axle.d
         && !fit.on_bound.contains(&(offset + 2));
-    PeakEvidence { reached, below, above, height }
+    PeakEvidence { reached, below, above, height, contradicts_prior: false }
 }
 
 /// D of the flatter curve with the same stiffness and, at the largest slip driven, the same force.

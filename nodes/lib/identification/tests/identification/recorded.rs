@@ -74,6 +74,15 @@ fn the_indy_car_has_stiffness_but_no_peak() {
 }
 
 #[test]
+fn a_prior_that_contradicts_the_small_cars_plateau_is_not_believed() {
+    let Some((sequence, vehicle)) = recorded("rc10_mocap", 60.0) else { return };
+    // The plateau is at 0.45 to 0.5.
+    let outcome = run(&sequence, &vehicle, Some(1.0), ResidualKind::None);
+    assert!(!outcome.accepted, "{:?}", outcome.reasons);
+    assert!(outcome.reasons.iter().any(|r| r.contains("contradicts")), "{:?}", outcome.reasons);
+}
+
+#[test]
 fn no_part_of_the_indy_cars_laps_shows_a_peak() {
     let Some((sequence, vehicle)) = recorded("iac_putnam", 60.0) else { return };
     let outcome = run(&sequence, &vehicle, None, ResidualKind::None);

@@ -56,7 +56,11 @@ pub fn identification_page(input: &IdentificationInput<'_>) -> Result<String, Re
                     @for chart in &pictures::residuals(outcome) { (figure(chart, "")?) }
                 }
             }))
-            (section("Rollout error over horizon, held-out data", false, &figure(&pictures::horizon(outcome), "")?))
+            (section("Rollout error over horizon, held-out data", false, &html! {
+                div.pair {
+                    @for chart in &pictures::horizon(outcome) { (figure(chart, "")?) }
+                }
+            }))
             (section("Lateral and forward acceleration", false, &figure(&pictures::accelerations(outcome), "")?))
         }
         @if fitted { (section("Held-out errors", false, &tables::errors(outcome))) }

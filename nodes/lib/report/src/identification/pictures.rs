@@ -1,6 +1,6 @@
 //! The pictures of an identification.
 
-use gripsight_identification::{Outcome, PeakFriction, Range, TireCurve, Trace};
+use gripsight_identification::{Change, HorizonError, Outcome, PeakFriction, Range, TireCurve, Trace};
 
 use super::IdentificationInput;
 use crate::{Axis, Chart, Layer, Role};
@@ -60,7 +60,7 @@ fn tire_curve(
         .slip_rad
         .windows(2)
         .zip(&curve.density)
-        .map(|(w, n)| (w[0].to_degrees(), w[1].to_degrees(), f64::from(*n)))
+        .map(|(w, n)| (w[0].to_degrees(), w[1].to_degrees(), f64::from(*n) / (w[1] - w[0])))
         .collect();
     let in_view =
         |values: &[f64]| over(values).into_iter().filter(|p| p.0 <= end_deg).map(|p| p.1).fold(0.0, f64::max);
@@ -217,22 +217,28 @@ fn binned(time_s: &[f64], measured: &[f64], model: &[f64]) -> Vec<(f64, f64)> {
 }
 
 /// Error of rollouts over their length.
-pub(super) fn horizon(outcome: &Outcome) -> Chart {
-    let line = |role: Role, name: &str, value: &dyn Fn(usize) -> f64| Layer::Line {
-        role,
-        name: name.into(),
-        points: std::iter::once((0.0, f64::NAN))
-            .chain((0..outcome.rollout_error.len()).map(|k| (outcome.rollout_error[k].horizon_s, value(k))))
-            .collect(),
+pub(super) fn horizon(outcome: &Outcome) -> [Chart; 2] {
+    let picture = |title: &str, unit: &str, error: &dyn Fn(&HorizonError) -> Change| {
+        let line = |role: Role, name: &str, value: &dyn Fn(Change) -> f64| Layer::Line {
+            role,
+            name: name.into(),
+            points: std::iter::once((0.0, f64::NAN))
+                .chain(outcome.rollout_error.iter().map(|e| (e.horizon_s, value(error(e)))))
+                .collect(),
+        };
+        Chart::new(
+            title,
+            Axis::new("time since the start of the rollout / s").from_zero(),
+            Axis::new(unit).from_zero(),
+        )
+        .sized(460, 230)
+        .with(line(Role::Nominal, "before", &|change| change.before))
+        .with(line(Role::Identified, "with the tires found", &|change| change.after))
     };
-    Chart::new(
-        "rollout error over horizon",
-        Axis::new("time since the start of the rollout / s").from_zero(),
-        Axis::new("RMS error / noise").from_zero(),
-    )
-    .sized(460, 230)
-    .with(line(Role::Nominal, "before", &|k| outcome.rollout_error[k].before))
-    .with(line(Role::Identified, "with the tires found", &|k| outcome.rollout_error[k].after))
+    [
+        picture("rollout error of the lateral velocity", "RMS error of v_y / (m/s)", &|e| e.v_y_mps),
+        picture("rollout error of the yaw rate", "RMS error / (rad/s)", &|e| e.yaw_rate_radps),
+    ]
 }
 
 /// The g-g diagram of the drive.
