@@ -118,7 +118,8 @@ pub(crate) fn direct(
         }
         let with_it = fitter.solve(&held, &fitter.training, &weights.sigma, 30);
         let misfit = |fit: &Fit| fit.linearization.window_costs.iter().sum::<f64>();
-        if misfit(&with_it) - misfit(&found) > CONTRADICTION {
+        let bends = [&peak.front, &peak.rear].iter().any(|axle| !axle.reached && axle.may_bend);
+        if bends && misfit(&with_it) - misfit(&found) > CONTRADICTION {
             peak.front.contradicts_prior = true;
             peak.rear.contradicts_prior = true;
         } else {

@@ -18,6 +18,8 @@ pub(crate) struct PeakEvidence {
     pub(crate) above: f64,
     /// Largest F_y/F_z within the slips visited.
     pub(crate) height: f64,
+    /// Whether the slips visited are such that a tire bends at all.
+    pub(crate) may_bend: bool,
     /// Whether the data fit much worse with the friction prior's D than without.
     pub(crate) contradicts_prior: bool,
 }
@@ -51,11 +53,12 @@ pub(super) fn evidence(fit: &Fit, offset: usize, slips: &Slips) -> PeakEvidence 
     let known = error.hypot(FORM * axle.d);
     let below = known.hypot(axle.d - height);
     let above = known.hypot((flatter_peak(&axle, furthest, height) - axle.d).max(0.0));
+    let may_bend = furthest > LEAST_PEAK_SLIP_RAD;
     let reached = below < KNOWN * axle.d
-        && furthest > LEAST_PEAK_SLIP_RAD
+        && may_bend
         && axle.normalized_stiffness() * furthest > PEAK_EXCESS * axle.d
         && !fit.on_bound.contains(&(offset + 2));
-    PeakEvidence { reached, below, above, height, contradicts_prior: false }
+    PeakEvidence { reached, below, above, height, may_bend, contradicts_prior: false }
 }
 
 /// D of the flatter curve with the same stiffness and, at the largest slip driven, the same force.
