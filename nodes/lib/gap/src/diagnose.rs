@@ -8,7 +8,7 @@ use crate::effects::{EffectId, Need};
 use crate::engine::{Engine, State, TireTrust};
 use crate::outcome::{DetectionLimit, Diagnosis, Invisible, TirePair, Unexplained};
 use crate::recording::Recording;
-use crate::rooms::Left;
+use crate::rooms::{Left, explained};
 use crate::search::{Found, search};
 use crate::select::reweigh;
 use crate::usable::{Usable, cannot_tell, refused, usable};
@@ -128,7 +128,9 @@ fn explain(
     let slip_rad = large_slip_rad(&engine, &null, &windows.training);
     let left = |state: &State| Left::by(&engine, state, &windows.training, slip_rad);
     let (before, after) = (left(&null), left(&state));
-    let remains = Remains { before: &before, after: &after, noise_is_known: noise::is_known(&recording) };
+    let explained = explained(&engine, &state, &windows.training);
+    let noise_is_known = noise::is_known(&recording);
+    let remains = Remains { before: &before, after: &after, explained: &explained, noise_is_known };
     let blocks = &windows.training.block;
     let mut claims =
         claims(&engine, &evidence, &state, &remains, blocks, costs.last().copied().unwrap_or(f64::NAN));

@@ -4,9 +4,29 @@
 use gripsight_identification::shooting::{self, Linearization, Parameter};
 use nalgebra::{DMatrix, DVector};
 
+use crate::effects::EffectId;
 use crate::engine::{Engine, FLEXIBLE_RIDGE, State};
 use crate::flexible::{Flexible, Room};
+use crate::search::without;
 use crate::windows::Windows;
+
+/// The engine with the channels counted by their noise.
+fn by_noise<'a>(engine: &Engine<'a>) -> Engine<'a> {
+    Engine { sigma: engine.recording.weights.clone(), ..engine.clone() }
+}
+
+fn cost(engine: &Engine<'_>, state: &State, windows: &Windows) -> f64 {
+    let now = engine.fit(&state.named, &state.parameters, Some(state.starts.clone()), windows, 0);
+    now.cost / now.residuals()
+}
+
+/// How much lower the cost per residual is for each effect of a state, beside the others.
+pub(crate) fn explained(engine: &Engine<'_>, state: &State, windows: &Windows) -> Vec<f64> {
+    let engine = &by_noise(engine);
+    let with = cost(engine, state, windows);
+    let less = |effect: &EffectId| cost(engine, &without(engine, state, *effect, windows), windows) - with;
+    state.named.iter().map(less).collect()
+}
 
 /// What a model leaves.
 #[derive(Debug, Clone)]
@@ -37,13 +57,12 @@ const TELLING_COST: f64 = 2.1;
 impl Left {
     /// What a state leaves where the channels count by their noise, its own parameters moving along.
     pub(crate) fn by(engine: &Engine<'_>, state: &State, windows: &Windows, slip_rad: f64) -> Self {
-        let engine = &Engine { sigma: engine.recording.weights.clone(), ..engine.clone() };
-        let now = engine.fit(&state.named, &state.parameters, Some(state.starts.clone()), windows, 0);
+        let engine = &by_noise(engine);
         let gain = |room| {
             let flexible = Flexible::new(engine.recording, slip_rad, engine.vehicle.wheelbase_m(), &[room]);
             (room, gain(engine, state, windows, &flexible))
         };
-        Self { cost: now.cost / now.residuals(), gains: Room::ALL.into_iter().map(gain).collect() }
+        Self { cost: cost(engine, state, windows), gains: Room::ALL.into_iter().map(gain).collect() }
     }
 
     /// The most that a room explains beyond what is usual; 0 where none does.

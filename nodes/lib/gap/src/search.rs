@@ -75,7 +75,7 @@ fn settled(engine: &mut Engine<'_>, state: &State, windows: &Windows) -> State {
 }
 
 /// The model without one of its effects, refitted.
-fn without(engine: &Engine<'_>, state: &State, effect: EffectId, windows: &Windows) -> State {
+pub(crate) fn without(engine: &Engine<'_>, state: &State, effect: EffectId, windows: &Windows) -> State {
     let named: Vec<EffectId> = state.named.iter().copied().filter(|e| *e != effect).collect();
     engine.fit(&named, &engine.carry(state, &named), Some(state.starts.clone()), windows, SETTLE)
 }

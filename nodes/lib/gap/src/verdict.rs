@@ -50,21 +50,23 @@ pub(crate) struct Claim {
 pub(crate) struct Remains<'r> {
     pub(crate) before: &'r Left,
     pub(crate) after: &'r Left,
+    /// For each effect found, how much the cost is lower for it, beside the others.
+    pub(crate) explained: &'r [f64],
     pub(crate) noise_is_known: bool,
 }
 
 impl Remains<'_> {
-    /// How much of the trust in the effects found is left, when free terms explain more than they do: an effect that is the cause leaves nothing
+    /// How much of the trust in an effect found is left, when free terms explain more than it does: an effect that is the cause leaves nothing
     /// to the rooms, a stand-in does.
-    fn trust(&self, left: f64) -> f64 {
-        /// Share of what the effects explain that free terms explain on top, at which the odds are even.
+    fn trust(&self, number: usize, left: f64) -> f64 {
+        /// Share of what the effect explains that free terms explain on top, at which the odds are even.
         const EVEN: f64 = 0.033;
         /// Where the noise is not known.
         const UNCERTAIN: f64 = 0.6;
         if !self.noise_is_known {
             return if left < thresholds::SMALL_COST { 1.0 } else { UNCERTAIN };
         }
-        let explained = (self.before.cost - self.after.cost).max(1e-3);
+        let explained = self.explained.get(number).map_or(1e-3, |e| e.max(1e-3));
         (1.0 + (self.after.beyond_usual() / explained / EVEN).powi(2)).recip()
     }
 }
@@ -78,14 +80,13 @@ pub(crate) fn claims(
     blocks: &[usize],
     left: f64,
 ) -> Vec<Claim> {
-    let trust = remains.trust(left);
-    let claim = |(&effect, round): (&EffectId, &Round)| {
+    let claim = |(number, (&effect, round)): (usize, (&EffectId, &Round))| {
         let confused = confused(round, effect);
-        let confidence = confidence(round, effect, &confused) * trust;
+        let confidence = confidence(round, effect, &confused) * remains.trust(number, left);
         let named = confidence >= LEAST_CONFIDENCE && is_told(state, effect, &engine.absent(effect), blocks);
         Claim { effect, confidence, confused, parameters: sizes(state, effect, blocks), named }
     };
-    state.named.iter().zip(evidence).map(claim).collect()
+    state.named.iter().zip(evidence).enumerate().map(claim).collect()
 }
 
 /// The verdict, with its reasons; claims lose their names where the verdict is another one.
