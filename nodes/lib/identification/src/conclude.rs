@@ -186,16 +186,17 @@ fn choose(run: &Identification) -> (PacejkaParameters, Source) {
     }
 }
 
-/// An estimate around `value` from the direct fit's standard error, widened by how far the direct fit lies off.
-fn around(value: f64, direct: f64, error: Option<f64>) -> Estimate {
-    let half = error.map_or(f64::NAN, |e| Estimate::Z90 * e) + (value - direct).abs();
+/// An estimate around `value` from the direct fit's standard error, widened by what other gains and lever arms would change and by how far the
+/// direct fit lies off.
+fn around(value: f64, direct: f64, error: Option<f64>, shift: f64) -> Estimate {
+    let half = error.map_or(f64::NAN, |e| (Estimate::Z90 * e).hypot(shift)) + (value - direct).abs();
     Estimate { value, low: value - half, high: value + half }
 }
 
 fn stiffness(run: &Identification, tires: &PacejkaParameters) -> PerAxle<Estimate> {
     let axle = |axle: &MagicFormula, direct: &MagicFormula, offset: usize, load_n: f64| {
         let (k, d) = (axle.normalized_stiffness(), direct.normalized_stiffness());
-        let e = around(k, d, standard_error(&run.direct.fit, offset));
+        let e = around(k, d, standard_error(&run.direct.fit, offset), run.direct.shift[offset]);
         Estimate { value: e.value * load_n, low: e.low.max(0.0) * load_n, high: e.high * load_n }
     };
     PerAxle {
@@ -236,7 +237,8 @@ fn signal_intervals(run: &Identification) -> SignalEstimates {
         // Where data and prior contradict each other one of them is wrong: widened by Birge's ratio, as the Particle Data Group does.
         let prior = run.direct.signal_priors[j];
         let error = run.direct.signal_errors[j]
-            .map(|e| e * ((value - prior.mean).abs() / prior.sigma.hypot(e)).max(1.0));
+            .map(|e| e * ((value - prior.mean).abs() / prior.sigma.hypot(e)).max(1.0))
+            .map(|e| e.hypot(run.direct.shift[SIGNALS + j] / Estimate::Z90));
         Estimate::from_error(value, error)
     }))
 }

@@ -57,6 +57,8 @@ pub(crate) struct Direct {
     pub(crate) allowed: Nuisance,
     /// The same as rollouts with [`Self::tires`] need it: what combined slip takes is in the tires already.
     pub(crate) nuisance: Nuisance,
+    /// What freeing gain and lever arm would change of every parameter, where that was not worth it and they stayed at their nominal values.
+    pub(crate) shift: [f64; PARAMETERS],
     /// Standard errors of the signal corrections.
     pub(crate) signal_errors: [Option<f64>; 6],
     /// What was held likely of them before the data were looked at.
@@ -100,7 +102,7 @@ pub(crate) fn direct(
 
     let (start, weights) = fitter.first(&all, &delays_s, LOW_SHARE * limit_mps2)?;
     restart(&mut all, &start.parameters);
-    let (mut all, mut found, weights) = fitter.refine(&all, weights);
+    let (mut all, mut found, weights, shift) = fitter.refine(&all, weights);
 
     let (slips, _) = fitter.visited(&found);
     let mut peak =
@@ -153,6 +155,7 @@ pub(crate) fn direct(
         corrections: corrections_of(&found.parameters),
         nuisance: Nuisance { combined_slip: 0.0, ..allowed },
         allowed,
+        shift,
         signal_errors: std::array::from_fn(|j| match standard_error(&errors, SIGNALS + j) {
             // The yaw rate's bias was known from the heading.
             None if j == 5 => Some(signal_priors[5].sigma),
@@ -245,8 +248,13 @@ impl Fitter<'_> {
         Ok((best, weights))
     }
 
-    /// All parameters on all windows, weighed by what they leave over; gain and lever arm freed where that is worth it.
-    fn refine(&self, all: &[Parameter], weights: Weights) -> (Vec<Parameter>, Fit, Weights) {
+    /// All parameters on all windows, weighed by what they leave over; gain and lever arm freed where that is worth it. Where it is not: what it
+    /// would change.
+    fn refine(
+        &self,
+        all: &[Parameter],
+        weights: Weights,
+    ) -> (Vec<Parameter>, Fit, Weights, [f64; PARAMETERS]) {
         let mut all = all.to_vec();
         for j in [GAIN, LEVER] {
             all[j].free = false;
@@ -273,15 +281,18 @@ impl Fitter<'_> {
                 best = other;
             }
         }
+        let mut shift = [0.0; PARAMETERS];
         if best.linearization.cost < (1.0 - WORTH) * found.linearization.cost {
             (all, found) = (freed, best);
+        } else {
+            shift = std::array::from_fn(|j| best.parameters[j] - found.parameters[j]);
         }
         for _ in 0..2 {
             weights = self::weights(&self.model, &found, &self.training, &self.data.noise);
             restart(&mut all, &found.parameters);
             found = self.solve(&all, &self.training, &weights.sigma, 15);
         }
-        (all, found, weights)
+        (all, found, weights, shift)
     }
 
     /// Slip angles, and F_y/F_z at them, along the fitted trajectories.
