@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes accuracy.md of accuracy_plants.csv, accuracy_draws.csv and accuracy_robustness.csv, which the example `accuracy` wrote."""
+"""Makes accuracy.md, residuals.md and paper.md of their heads (*_head.md) and of what the examples `accuracy`, `residuals` and `paper` wrote."""
 
 import csv
 import statistics
@@ -7,6 +7,8 @@ from math import sqrt
 from pathlib import Path
 
 HERE = Path(__file__).parent
+# Medians within this share of the best are a tie.
+TIE = 0.05
 
 
 def rows(name):
@@ -101,8 +103,73 @@ def draws(out):
     for axle, name in (("f", "front"), ("r", "rear")):
         out.append(f"- median ratio to the floor {name}: {statistics.median(ratio(r, axle) for r in used):.2f}; accepted runs: {statistics.median(ratio(r, axle) for r in used if int(r['accepted'])):.2f}")
     accepted = [r for r in used if int(r["accepted"])]
+    apart = [max(abs(number(r, k) / number(r, k + "_true") - 1) for k in ("kf", "kr")) for r in accepted]
+    out.append(f"- largest error of an accepted stiffness: {100 * max(apart):.0f} %; 95th percentile {100 * sorted(apart)[len(apart) * 95 // 100]:.0f} %")
     wrong = sum(max(abs(number(r, k) / number(r, k + "_true") - 1) for k in ("kf", "kr")) > 0.25 for r in accepted)
     out.append(f"- accepted: {len(accepted)} of {len(used)}; with a stiffness off by more than 25 %: {wrong}")
+
+
+def priors(out):
+    out.append("\n| prior | used | accepted | with D at the prior | D off by more than 25 % | stiffness off by more than 25 % | refused as contradicting |")
+    out.append("| --- | --- | --- | --- | --- | --- | --- |")
+    for name, off in (("accuracy_prior_0.csv", "the road's mu"), ("accuracy_prior_0.4.csv", "0.4 above it")):
+        used = [r for r in rows(name) if not refused(r)]
+        accepted = [r for r in used if int(r["accepted"])]
+        held = sum("the prior's" in r["reasons"] for r in accepted)
+        against = sum("contradicts" in r["reasons"] for r in used)
+        worst = lambda r, of, truth: max(abs(number(r, of + a) / number(r, f"{of}{a}_{truth}") - 1) for a in "fr")
+        out.append(
+            f"| {off} | {len(used)} | {len(accepted)} | {held} | "
+            f"{sum(worst(r, 'd', 'floor') > 0.25 for r in accepted)} | {sum(worst(r, 'k', 'true') > 0.25 for r in accepted)} | "
+            f"{against} |"
+        )
+
+
+def spread(values, digits=3):
+    return f"{statistics.median(values):.{digits}f} ({min(values):.{digits}f}-{max(values):.{digits}f})"
+
+
+def residuals(out):
+    every = rows("residuals.csv")
+    methods = list(dict.fromkeys((r["prior"], r["method"]) for r in every))
+    group = {m: [r for r in every if (r["prior"], r["method"]) == m] for m in methods}
+    of = lambda m, key: [number(r, key) for r in group[m]]
+    floor = [spread([number(r, k) for r in every], 4) for k in ("floor_front", "floor_rear")]
+    out.append(f"\nFloor: {floor[0]} front, {floor[1]} rear.\n")
+    out.append("| prior | method | RMSE front | rear | rollout v_y, mm/s | yaw rate, mrad/s | turns | accepted | s |")
+    out.append("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    figures = ("rmse_front", "rmse_rear", "rollout_v_y_mps", "rollout_yaw_rate_radps")
+    for prior in dict.fromkeys(p for p, _ in methods):
+        best = {k: min(statistics.median(of(m, k)) for m in methods if m[0] == prior) for k in figures}
+        for m in (m for m in methods if m[0] == prior):
+            cells = []
+            for k in figures:
+                text = spread(of(m, k), 4) if k.startswith("rmse") else spread([1e3 * v for v in of(m, k)], 1)
+                tie = statistics.median(of(m, k)) <= (1 + TIE) * best[k]
+                cells.append(f"**{text}**" if tie else text)
+            accepted = sum(r["accepted"] == "true" for r in group[m])
+            out.append(
+                f"| {prior} | {m[1]} | " + " | ".join(cells) + f" | {', '.join(r['turns'] for r in group[m])} | {accepted} of {len(group[m])} | "
+                f"{statistics.median(of(m, 'seconds')):.2f} |"
+            )
+    out.append("\n![RMSE of every method and drive](residuals.svg)")
+
+
+def paper(out):
+    every = rows("paper.csv")
+    for data, title in (("first", "Triggered in the first acceleration: the first 9 s"), ("whole", "The whole drive, 30 s")):
+        out.append(f"\n## {title}\n")
+        out.append("| network | prior | RMSE front, median (range) | rear | turns at 0.02 | at 0.05 | settled | s, median |")
+        out.append("| --- | --- | --- | --- | --- | --- | --- | --- |")
+        for prior in ("none", "0.8"):
+            for network in ("mlp", "rnn", "s4"):
+                group = [r for r in every if (r["data"], r["prior"], r["network"]) == (data, prior, network)]
+                turns = [", ".join(r[k].replace("none", "-") for r in group) for k in ("turns_at_0.02", "turns_at_0.05")]
+                settled = sum(r["converged"] == "true" for r in group)
+                figures = [spread([number(r, k) for r in group]) for k in ("rmse_front", "rmse_rear")]
+                seconds = statistics.median(number(r, "seconds") for r in group)
+                out.append(f"| {network} | {prior} | {figures[0]} | {figures[1]} | {turns[0]} | {turns[1]} | {settled} of {len(group)} | {seconds:.1f} |")
+    out.append("\n![RMSE of every network and drive](paper.svg)")
 
 
 def robustness(out):
@@ -138,14 +205,28 @@ def robustness(out):
         out.append(f"| {car} | " + " | ".join(cells) + " |")
 
 
+def write(name, parts):
+    """The head of a page, and its tables."""
+    out = [(HERE / f"{name}_head.md").read_text(encoding="utf-8").rstrip()]
+    for title, part in parts:
+        if title:
+            out.append(f"\n## {title}")
+        part(out)
+    (HERE / f"{name}.md").write_text("\n".join(out) + "\n", encoding="utf-8")
+
+
 def main():
-    out = [(HERE / "accuracy_head.md").read_text(encoding="utf-8").rstrip(), "\n## Plants"]
-    plants(out)
-    out.append("\n## Intervals and claims of a peak")
-    draws(out)
-    out.append("\n## Robustness")
-    robustness(out)
-    (HERE / "accuracy.md").write_text("\n".join(out) + "\n", encoding="utf-8")
+    write(
+        "accuracy",
+        [
+            ("Plants", plants),
+            ("Intervals and claims of a peak", draws),
+            ("Draws with a friction prior", priors),
+            ("Robustness", robustness),
+        ],
+    )
+    write("residuals", [("", residuals)])
+    write("paper", [("", paper)])
 
 
 if __name__ == "__main__":
