@@ -31,6 +31,7 @@ pub(crate) fn draw(title: &str, lines: &[Line], floor: [f64; 2], path: &Path) ->
         .configure_mesh()
         .disable_y_mesh()
         .disable_y_axis()
+        .x_label_formatter(&|x| format!("{x:.2}"))
         .x_desc("RMSE of F_y/F_z; blue front, orange rear; dashes: floor; one dot a drive")
         .draw()?;
     let colors = [RGBColor(31, 90, 180), RGBColor(214, 110, 20)];
