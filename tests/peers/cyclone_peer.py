@@ -1,7 +1,8 @@
 """A CycloneDDS peer of the suite: it knows ROS 2's names and the .msg files, and nothing of the suite's code.
 
     cyclone_peer.py subscribe TOPIC TYPE [--qos latched|reliable|sensor] [--count N] [--timeout S]
-    cyclone_peer.py publish TOPIC TYPE [--qos ...]      messages as JSON lines on standard input
+    cyclone_peer.py publish TOPIC TYPE [--qos ...]      messages as JSON lines on standard input; --times N sends each N times,
+                                                        --stamp with the time of sending in its header
     cyclone_peer.py call SERVICE TYPE REQUEST           a service of a node under rmw_cyclonedds_cpp; REQUEST is JSON
 
 Messages are printed as JSON lines, one object each, with the field names of the .msg files; the line `ready` says that the
@@ -136,8 +137,12 @@ def publish(participant, args):
     if not wait_until(writer.get_matched_subscriptions, args.timeout):
         return False
     for line in sys.stdin:
-        writer.write(build(kind, json.loads(line)))
-        time.sleep(args.period)
+        message = build(kind, json.loads(line))
+        for _ in range(args.times):
+            if args.stamp:
+                message.header.stamp.sec, message.header.stamp.nanosec = divmod(time.time_ns(), 10**9)
+            writer.write(message)
+            time.sleep(args.period)
     return args.qos == "sensor" or writer.wait_for_acks(duration(seconds=args.timeout))
 
 
@@ -170,6 +175,8 @@ def main():
     parser.add_argument("--qos", choices=["latched", "reliable", "sensor"], default="reliable")
     parser.add_argument("--count", type=int, default=1)
     parser.add_argument("--period", type=float, default=0.0, help="seconds between published messages")
+    parser.add_argument("--times", type=int, default=1)
+    parser.add_argument("--stamp", action="store_true")
     parser.add_argument("--timeout", type=float, default=20.0)
     args = parser.parse_args()
     work = {"subscribe": subscribe, "publish": publish, "call": call}[args.command]

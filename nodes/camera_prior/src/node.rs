@@ -2,19 +2,26 @@
 
 use std::time::{Duration, Instant};
 
-use futures::FutureExt;
 use gripsight_bag::{decode, encode};
 use gripsight_friction::{
     Estimate, Frame, FrameData, FrictionEstimator, Motion, Odometer, RawPicture, Reason, RgbPicture, Source,
 };
 use gripsight_msgs::FrictionPrior;
+use gripsight_msgs::standard::builtin_interfaces::Time;
 use gripsight_msgs::standard::nav_msgs::Odometry;
 use gripsight_msgs::standard::sensor_msgs::{CompressedImage, Image};
 use gripsight_msgs::standard::std_msgs::Header;
 use gripsight_runtime::{Clock, Diagnostics, Node, Publisher, Qos, Subscription};
 
+use tokio::time::MissedTickBehavior;
+
 use crate::diagnostics::{Counts, Facts, status};
 use crate::settings;
+
+/// Age from which a picture is late: several times what transport takes.
+const LATE_NS: i64 = 100_000_000;
+/// How long a late picture waits for a newer one: longer than a camera's period at 30 Hz.
+const SETTLE: Duration = Duration::from_millis(50);
 
 /// Declares parameters and topics; gives the node's work.
 pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyhow::Result<()>> + use<>> {
@@ -60,6 +67,8 @@ async fn work(
     mut odometry: Subscription<Odometry>,
 ) -> anyhow::Result<()> {
     let mut ticks = tokio::time::interval(Duration::from_secs(1));
+    // After a stop of the process: one tick, not all those missed.
+    ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         // Odometry first: a picture is then placed by the newest distance.
         tokio::select! {
@@ -69,11 +78,11 @@ async fn work(
                 state.odometer.push(sample.stamp_ns, sample.v_x_mps.hypot(sample.v_y_mps));
             }
             Some(first) = next(&mut compressed) => {
-                let message = newest(&mut compressed, first, &mut state.counts);
+                let message = state.newest(&mut compressed, first, |m| m.header.stamp).await;
                 state.take(message.header, FrameData::Compressed(&message.data)).await;
             }
             Some(first) = next(&mut raw) => {
-                let message = newest(&mut raw, first, &mut state.counts);
+                let message = state.newest(&mut raw, first, |m| m.header.stamp).await;
                 let picture = RawPicture {
                     width: message.width,
                     height: message.height,
@@ -98,16 +107,6 @@ async fn next<M>(subscription: &mut Option<Subscription<M>>) -> Option<M> {
     }
 }
 
-/// The newest message that has arrived: those before it are old, and would only delay it.
-fn newest<M>(subscription: &mut Option<Subscription<M>>, first: M, counts: &mut Counts) -> M {
-    let mut message = first;
-    while let Some(Some(newer)) = next(subscription).now_or_never() {
-        message = newer;
-        counts.dropped += 1;
-    }
-    message
-}
-
 struct State {
     estimator: FrictionEstimator,
     no_network: Option<String>,
@@ -127,6 +126,27 @@ struct State {
 }
 
 impl State {
+    /// The newest picture that has arrived: those before it are old, and would only delay it. Behind a late one others
+    /// may still be on their way out of the socket (the process was stopped, say): it waits for them, up to [`SETTLE`].
+    async fn newest<M>(
+        &mut self,
+        subscription: &mut Option<Subscription<M>>,
+        first: M,
+        stamp: impl Fn(&M) -> Time,
+    ) -> M {
+        let mut message = first;
+        let arrived = tokio::time::Instant::now();
+        loop {
+            let age_ns = decode::stamp_ns(self.clock.now()).saturating_sub(decode::stamp_ns(stamp(&message)));
+            let patience = if age_ns > LATE_NS { SETTLE } else { Duration::ZERO };
+            match tokio::time::timeout_at(arrived + patience, next(subscription)).await {
+                Ok(Some(newer)) => message = newer,
+                Ok(None) | Err(_) => return message,
+            }
+            self.counts.dropped += 1;
+        }
+    }
+
     /// Reads a picture and publishes what it says.
     async fn take(&mut self, header: Header, data: FrameData<'_>) {
         let stamp_ns = decode::stamp_ns(header.stamp);

@@ -14,7 +14,7 @@ from textures import OUTLIERS, ROADS, load_photographs
 
 MEAN = np.array([0.485, 0.456, 0.406], np.float32)
 STD = np.array([0.229, 0.224, 0.225], np.float32)
-BANK_SEEDS = {"train": 11, "val": 12, "test": 13}
+BANK_SEEDS = {"train": 11, "val": 12, "test": 13}  # of the random fields; a training run's own seed is joined to the first
 OUTLIER_SHARE, PROCEDURAL_SHARE = 0.15, 0.2
 # Untouched photographs, in the order of ROADS: half of them concrete, which is what looks most like snow.
 PLAIN_SHARES = (0.2, 0.5, 0.1, 0.1, 0.05, 0.05)
@@ -55,7 +55,7 @@ class Renders(Dataset):
         self.outliers, self.procedural_share, self.plain_share = outliers, procedural_share, plain_share
         self.finer_share = finer_share
         self.photographs = load_photographs(root, split, (*ROADS, *OUTLIERS))
-        self.bank = Bank(BANK_SEEDS[split])
+        self.bank = Bank((BANK_SEEDS[split], seed) if split == "train" else BANK_SEEDS[split])
         self.folders, self.shares = list(ROADS), np.array(list(ROADS.values()))
 
     def __len__(self):

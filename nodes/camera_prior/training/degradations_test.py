@@ -16,23 +16,6 @@ def salt_and_pepper(rng, bank, road, photographs):
     return out
 
 
-def motion_smear(rng, bank, road, photographs):
-    n = int(road.shape[0] * rng.uniform(0.3, 0.7)) | 1
-    kernel = np.full((n, 1), 1.0 / n, np.float32)
-    return cv2.filter2D(road, -1, kernel if rng.random() < 0.5 else kernel.T)
-
-
-def droplets(rng, bank, road, photographs):
-    size = road.shape[0]
-    out, y, x = road.astype(np.float32), *np.mgrid[:size, :size]
-    soft = cv2.GaussianBlur(out, (0, 0), size / 28)
-    for _ in range(int(rng.integers(25, 60))):
-        cx, cy, r = rng.uniform(0, size), rng.uniform(0, size), rng.uniform(0.04, 0.13) * size
-        inside = np.clip(1.5 * (1 - np.hypot(x - cx, y - cy) / r), 0, 1)[:, :, None]
-        out = out * (1 - inside) + inside * (soft[::-1] * 1.15)
-    return np.clip(out, 0, 255).astype(np.uint8)
-
-
 def banding(rng, bank, road, photographs):
     rows = rng.normal(0, rng.uniform(40, 90), (road.shape[0], 1, 1))
     return np.clip(road + rows, 0, 255).astype(np.uint8)
@@ -77,13 +60,6 @@ def grille(rng, bank, road, photographs):
     return (road + alpha * (rng.uniform(5, 200) - road)).astype(np.uint8)
 
 
-def combed(rng, bank, road, photographs):
-    """Interlaced halves that do not belong together."""
-    out = road.copy()
-    out[1::2] = np.roll(road[::-1], int(rng.integers(10, road.shape[1] // 2)), 1)[1::2]
-    return out
-
-
 def cracked_lens(rng, bank, road, photographs):
     """Shards, each showing another place, with bright edges."""
     size, n = road.shape[0], int(rng.integers(12, 30))
@@ -97,16 +73,6 @@ def cracked_lens(rng, bank, road, photographs):
     return out
 
 
-def rain_streaks(rng, bank, road, photographs):
-    """Water running down the lens: long bent strips of the blurred picture."""
-    size = road.shape[0]
-    wander = bank.sample(rng, 3.0, size, 3.0, 0.0, 4.0)
-    x = np.arange(size, dtype=np.float32)[None, :] + 8 * wander
-    strip = np.clip(2 * np.sin(x * 2 * np.pi / rng.uniform(0.08, 0.2) / size) + rng.uniform(0, 1), 0, 1)[:, :, None]
-    soft = cv2.GaussianBlur(road, (0, 0), size / 25).astype(np.float32)[:, ::-1]
-    return np.clip(road + strip * (soft * rng.uniform(0.9, 1.3) - road), 0, 255).astype(np.uint8)
-
-
 def night(rng, bank, road, photographs):
     """A spot of headlight on an otherwise black road, much noise."""
     size = road.shape[0]
@@ -116,5 +82,40 @@ def night(rng, bank, road, photographs):
     return np.clip(road * (0.02 + rng.uniform(0.5, 1.2) * spot) + noise, 0, 255).astype(np.uint8)
 
 
-FAMILIES = (salt_and_pepper, motion_smear, droplets, banding, test_pattern, broken_blocks, occlusion, swapped_channels,
-            outlier_photo("ground"), outlier_photo("sett"), outlier_photo("paving_stones"), grille, combed, cracked_lens, rain_streaks, night)
+def dead_columns(rng, bank, road, photographs):
+    """Columns of the sensor that are stuck at one value each."""
+    out, size = road.copy(), road.shape[1]
+    stuck = rng.random(size) < rng.uniform(0.2, 0.5)
+    out[:, stuck] = rng.integers(0, 256, (int(stuck.sum()), 1))
+    return out
+
+
+def jelly(rng, bank, road, photographs):
+    """A rolling shutter on a shaking mount: rows pushed far to and fro."""
+    size = road.shape[0]
+    y, x = np.mgrid[:size, :size].astype(np.float32)
+    shift = rng.uniform(0.1, 0.3) * size * np.sin(y * 2 * np.pi / (rng.uniform(0.06, 0.25) * size) + rng.uniform(0, 6.3))
+    return cv2.remap(road, x + shift.astype(np.float32), y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT_101)
+
+
+def misregistered(rng, bank, road, photographs):
+    """The three colours of three different moments."""
+    reach = road.shape[0] // 4
+    return np.dstack([np.roll(road[:, :, c], rng.integers(-reach, reach + 1, 2), (0, 1)) for c in range(3)])
+
+
+def overlay(rng, bank, road, photographs):
+    """A menu of the camera's own over the picture."""
+    out, size = road.copy(), road.shape[0]
+    top, left = (rng.uniform(0.02, 0.2, 2) * size).astype(int)
+    out[top:int(0.85 * size), left:int(0.9 * size)] = (0.4 * out[top:int(0.85 * size), left:int(0.9 * size)]).astype(np.uint8)
+    colour = tuple(int(v) for v in rng.integers(150, 256, 3))
+    for k in range(int(rng.integers(5, 9))):
+        text = "".join(chr(c) for c in rng.integers(65, 91, int(rng.integers(5, 14))))
+        at = (left + size // 20, top + (k + 1) * size // 11)
+        cv2.putText(out, text, at, cv2.FONT_HERSHEY_SIMPLEX, size / 400, colour, max(1, size // 112), cv2.LINE_AA)
+    return out
+
+
+FAMILIES = (salt_and_pepper, banding, test_pattern, broken_blocks, occlusion, swapped_channels, outlier_photo("sett"),
+            outlier_photo("paving_stones"), grille, cracked_lens, night, dead_columns, jelly, misregistered, overlay)

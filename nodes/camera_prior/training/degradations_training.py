@@ -219,6 +219,40 @@ def planks(rng, bank, road, photographs):
     return finish(rng, out if rng.random() < 0.5 else out.transpose(1, 0, 2))
 
 
-FAMILIES = (black, white, flat_colour, gradient, noise, noisy_road, blur, over_exposed, lens_dirt, outlier_photo("grass"), fog, flare,
-            scratches, radial_blur, frosted, condensation, mosaic, posterised, negative, torn, scrambled,
-            false_colour, bodywork, sky, wall, planks)
+def motion_smear(rng, bank, road, photographs):
+    n = int(road.shape[0] * rng.uniform(0.3, 0.7)) | 1
+    kernel = np.full((n, 1), 1.0 / n, np.float32)
+    return cv2.filter2D(road, -1, kernel if rng.random() < 0.5 else kernel.T)
+
+
+def droplets(rng, bank, road, photographs):
+    size = road.shape[0]
+    out, y, x = road.astype(np.float32), *np.mgrid[:size, :size]
+    soft = cv2.GaussianBlur(out, (0, 0), size / 28)
+    for _ in range(int(rng.integers(25, 60))):
+        cx, cy, r = rng.uniform(0, size), rng.uniform(0, size), rng.uniform(0.04, 0.13) * size
+        inside = np.clip(1.5 * (1 - np.hypot(x - cx, y - cy) / r), 0, 1)[:, :, None]
+        out = out * (1 - inside) + inside * (soft[::-1] * 1.15)
+    return np.clip(out, 0, 255).astype(np.uint8)
+
+
+def combed(rng, bank, road, photographs):
+    """Interlaced halves that do not belong together."""
+    out = road.copy()
+    out[1::2] = np.roll(road[::-1], int(rng.integers(10, road.shape[1] // 2)), 1)[1::2]
+    return out
+
+
+def rain_streaks(rng, bank, road, photographs):
+    """Water running down the lens: long bent strips of the blurred picture."""
+    size = road.shape[0]
+    wander = bank.sample(rng, 3.0, size, 3.0, 0.0, 4.0)
+    x = np.arange(size, dtype=np.float32)[None, :] + 8 * wander
+    strip = np.clip(2 * np.sin(x * 2 * np.pi / rng.uniform(0.08, 0.2) / size) + rng.uniform(0, 1), 0, 1)[:, :, None]
+    soft = cv2.GaussianBlur(road, (0, 0), size / 25).astype(np.float32)[:, ::-1]
+    return np.clip(road + strip * (soft * rng.uniform(0.9, 1.3) - road), 0, 255).astype(np.uint8)
+
+
+FAMILIES = (black, white, flat_colour, gradient, noise, noisy_road, blur, over_exposed, lens_dirt, outlier_photo("grass"),
+            outlier_photo("ground"), fog, flare, scratches, radial_blur, frosted, condensation, mosaic, posterised, negative, torn,
+            scrambled, false_colour, bodywork, sky, wall, planks, motion_smear, droplets, combed, rain_streaks)

@@ -10,6 +10,7 @@ use gripsight_msgs::{FrictionPrior, Message};
 use gripsight_tests::domain::Domain;
 use gripsight_tests::peers::{PATIENCE, available, cyclone, message, start_cyclone};
 use gripsight_tests::process::{Process, node};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use serde_json::json;
 
 const FRICTION: &str = "/camera_prior/friction";
@@ -58,8 +59,8 @@ fn a_configured_prior_reaches_a_late_peer() {
 }
 
 /// A road picture as a JPEG.
-fn road() -> Vec<u8> {
-    let picture = image::open(in_tree("nodes/lib/friction/tests/golden/road.png")).unwrap().to_rgb8();
+fn road(file: &str) -> Vec<u8> {
+    let picture = image::open(in_tree("nodes/lib/friction/tests/golden").join(file)).unwrap().to_rgb8();
     let mut jpeg = Cursor::new(vec![]);
     picture.write_to(&mut jpeg, image::ImageFormat::Jpeg).unwrap();
     jpeg.into_inner()
@@ -88,7 +89,7 @@ fn a_peer_s_pictures_are_read_and_broken_ones_refused() {
     let _node = node(&domain, "camera_prior", &[&age[..], &files].concat());
     let topic = ["publish", "/image/compressed", CompressedImage::TYPE, "--qos", "sensor", "--period", "1"];
     let mut peer = start_cyclone(&domain, &python, &topic);
-    let jpeg = road();
+    let jpeg = road("road.png");
     peer.feed(&(line(&jpeg, 0) + &line(&jpeg[..jpeg.len() / 2], 1)));
 
     let read = prior(&listener, |p| p.reason != "no_picture");
@@ -129,4 +130,54 @@ fn without_its_model_the_node_runs_on_and_says_so() {
         let told: FrictionPrior = message(&listener);
         assert_eq!((told.valid, told.source, told.mu), (true, FrictionPrior::CONFIGURED, 0.72));
     }
+}
+
+/// A picture that takes long to read: 8000 x 8000 black pixels in some tens of kilobytes.
+fn slow() -> Vec<u8> {
+    let mut png = vec![];
+    let encoder = PngEncoder::new_with_quality(&mut png, CompressionType::Default, FilterType::NoFilter);
+    image::GrayImage::new(8000, 8000).write_with_encoder(encoder).unwrap();
+    assert!(png.len() < 100_000, "{} bytes may not pass the socket", png.len());
+    png
+}
+
+#[test]
+fn after_a_slow_picture_the_newest_is_read_and_those_that_waited_are_not() {
+    let Ok(python) = cyclone() else {
+        available(&[cyclone()]);
+        return;
+    };
+    let Some([library, model]) = engine() else { return };
+    let domain = Domain::new();
+    let listener = listen(&domain, &python, FRICTION, FrictionPrior::TYPE, "reliable");
+    let diagnostics = listen(&domain, &python, "/diagnostics", DiagnosticArray::TYPE, "reliable");
+    let _node = node(&domain, "camera_prior", &["-p", &library, "-p", &model]);
+    let topic = ["publish", "/image/compressed", CompressedImage::TYPE, "--qos", "sensor", "--stamp"];
+    let publish = |more: &[&str]| start_cyclone(&domain, &python, &[&topic[..], more].concat());
+    let mut camera = publish(&["--period", "0.02", "--times", "1000"]);
+    camera.feed(&line(&road("input.png"), 0));
+    prior(&listener, |p| p.valid && p.source == FrictionPrior::CAMERA);
+    let mut other = publish(&["--period", "1"]);
+    other.feed(&line(&slow(), 0));
+
+    let stamp_s =
+        |p: &FrictionPrior| f64::from(p.header.stamp.sec) + f64::from(p.header.stamp.nanosec) * 1e-9;
+    let mut priors = std::iter::repeat_with(|| message::<FrictionPrior>(&listener));
+    let slow = priors.by_ref().find(|p| p.reason == "dark").unwrap();
+    let next = priors.next().unwrap();
+    let number = |key: &str, enough: f64| {
+        let values = std::iter::repeat_with(|| message::<DiagnosticArray>(&diagnostics))
+            .flat_map(|array| array.status)
+            .flat_map(|status| status.values);
+        let mut numbers = values.filter(|v| v.key == key).map(|v| v.value.parse::<f64>().unwrap());
+        numbers.find(|number| *number >= enough).unwrap()
+    };
+    let took_s = number("longest time for a picture [ms]", 100.0) * 1e-3;
+    let ahead_s = stamp_s(&next) - stamp_s(&slow);
+    assert!(
+        next.valid && ahead_s > 0.5 * took_s,
+        "reading took {took_s} s; then one {ahead_s} s newer: {next:?}"
+    );
+    // There was a queue to be dropped.
+    assert!(number("pictures dropped for newer ones", 1.0) >= 1.0);
 }
