@@ -57,7 +57,13 @@ fn main() -> anyhow::Result<()> {
     let reference = drive(&car, &[], DURATION_S, 51)?;
     let vehicle = nominal(&car);
     for name in &names {
-        let (recording, true_size) = driven(&car, name)?;
+        let (recording, true_size) = match driven(&car, name) {
+            Ok(driven) => driven,
+            Err(error) => {
+                println!("{error:#}");
+                continue;
+            }
+        };
         let started = Instant::now();
         let request = Request { reference: Some(&reference), ..Request::new(&recording, &vehicle) };
         let d = diagnose(&request, &mut |_| {}).with_context(|| name.clone())?;

@@ -116,12 +116,12 @@ pub(super) fn horizon(d: &Diagnosis) -> Chart {
     let line = |role: Role, name: &str, column: usize| Layer::Line {
         role,
         name: name.into(),
-        points: d.series.horizon.iter().map(|p| (p[0], p[column])).collect(),
+        points: d.series.horizon.iter().map(|p| (p[0], p[column].sqrt())).collect(),
     };
     Chart::new(
         "error over horizon",
         Axis::new("length of the rollouts / s").from_zero(),
-        Axis::new("squared error / noise").from_zero(),
+        Axis::new("root mean square error / noise").from_zero(),
     )
     .sized(460, 230)
     .with(line(Role::Nominal, "model as it came", 1))

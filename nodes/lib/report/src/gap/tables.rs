@@ -4,7 +4,7 @@ use gripsight_gap::{Diagnosis, EffectParameter, Estimate, Place, RankedEffect};
 use maud::{Markup, html};
 
 use crate::Role;
-use crate::bars::{Bar, bars};
+use crate::bars::{Bar, bars, logarithmic};
 use crate::health::health;
 use crate::page::{facts_table, list};
 use crate::text::{interval, percent, significant, with_interval};
@@ -44,6 +44,7 @@ pub(super) fn budget(d: &Diagnosis) -> Markup {
     html! {
         (bars(&rows))
         p {
+            @if logarithmic(&rows) { "Bars by the logarithm, from the noise on. " }
             "Mean squared error of open-loop rollouts of " (significant(g.horizon_s, 2)) " s on " (g.scored_on)
             ", each channel over its noise (" (noise(d)) "); the thin line is the 90 % interval by block bootstrap. "
             "Flexible terms without any physics reach " (significant(ceiling.value, 3))
@@ -88,10 +89,10 @@ pub(super) fn tires(d: &Diagnosis) -> Markup {
     ];
     let change = |a: f64, b: f64| {
         let percent = 100.0 * (b - a) / a;
-        if percent.is_finite() { format!("{percent:+.1} %") } else { String::new() }
+        if percent.is_finite() { format!("{percent:+.1} %").replace('-', "\u{2212}") } else { String::new() }
     };
     html! {
-        table {
+        table.tires {
             thead { tr { th { "Axle" } th { "" } th { "B" } th { "C" } th { "D" } th { "E" } th { "stiffness / load (B C D)" } } }
             tbody {
                 @for (axle, without, with) in axles {
@@ -139,10 +140,17 @@ fn size(name: &str, p: &EffectParameter) -> String {
 
 /// A name without underscores, and without the unit at its end: that stands beside the number.
 fn words(name: &str) -> String {
-    const UNITS: [&str; 8] = ["_radps", "_rad", "_mps", "_m", "_s", "_1pm", "_per_min", "_per_g"];
+    const UNITS: [&str; 9] = ["_radps", "_rad", "_mps2", "_mps", "_m", "_s", "_1pm", "_per_min", "_per_g"];
+    if name == "rad_per_g" {
+        return "angle".to_owned();
+    }
     let bare = UNITS.iter().find_map(|unit| name.strip_suffix(unit)).unwrap_or(name);
     // The velocities keep theirs.
-    bare.replace('_', " ").replace("v x", "v_x").replace("v y", "v_y")
+    bare.replace('_', " ")
+        .replace("v x", "v_x")
+        .replace("v y", "v_y")
+        .replace("a x", "a_x")
+        .replace("a y", "a_y")
 }
 
 fn unit(unit: &str) -> String {
@@ -200,12 +208,18 @@ pub(super) fn data(d: &Diagnosis, notes: &[String]) -> Markup {
     }
 }
 
+/// The unit at the end of a channel's name.
+fn channel_unit(name: &str) -> &'static str {
+    let units = [("_mps2", " m/s²"), ("_mps", " m/s"), ("_radps", " rad/s"), ("_rad", " rad")];
+    units.into_iter().find(|(end, _)| name.ends_with(end)).map_or("", |(_, unit)| unit)
+}
+
 /// The noise of each channel.
 fn noise(d: &Diagnosis) -> String {
     d.gap
         .channel_noise
         .iter()
-        .map(|(name, sigma)| format!("{name} {}", significant(*sigma, 2)))
+        .map(|(name, sigma)| format!("{} {}{}", words(name), significant(*sigma, 2), channel_unit(name)))
         .collect::<Vec<_>>()
         .join(", ")
 }
@@ -218,7 +232,8 @@ mod tests {
     fn names_lose_underscores_and_units() {
         assert_eq!(words("steering_delay"), "steering delay");
         assert_eq!((words("delay_s"), words("v_y_lever_arm")), ("delay".into(), "v_y lever arm".into()));
-        assert_eq!(words("rad_per_g"), "rad");
+        assert_eq!(words("rad_per_g"), "angle");
+        assert_eq!((words("a_y_mps2"), channel_unit("a_y_mps2")), ("a_y".into(), " m/s²"));
         assert_eq!(words("yaw_rate_radps"), "yaw rate");
         assert_eq!((unit("1"), unit("m/s2")), (String::new(), " m/s²".into()));
     }

@@ -1,0 +1,117 @@
+//! Recordings that are short, slow or broken: an answer that says what it rests on, or a refusal with the reason.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::sync::OnceLock;
+
+use common::{drive, nominal};
+use gripsight_gap::{Diagnosis, GapError, Request, Verdict, diagnose};
+use gripsight_reference_car::CarParameters;
+use gripsight_signals::StateSequence;
+
+/// The bias of v_y that is driven with.
+const BIAS_MPS: f64 = 0.15;
+
+fn recording() -> &'static StateSequence {
+    static RECORDING: OnceLock<StateSequence> = OnceLock::new();
+    RECORDING.get_or_init(|| {
+        let car = CarParameters::by_name("f1tenth").unwrap();
+        drive(&car, &[&format!("v_y_bias={BIAS_MPS}")], 24.0, 25).unwrap()
+    })
+}
+
+/// Samples `kept` of the recording, on the channels that every car has.
+fn picked(kept: impl Fn(usize, f32) -> bool) -> StateSequence {
+    let all = recording();
+    let kept: Vec<usize> = (0..all.len()).filter(|&k| kept(k, all.time_s[k])).collect();
+    let pick = |channel: &[f32]| kept.iter().map(|&k| channel[k]).collect();
+    StateSequence {
+        time_s: pick(&all.time_s),
+        v_x_mps: pick(&all.v_x_mps),
+        v_y_mps: pick(&all.v_y_mps),
+        yaw_rate_radps: pick(&all.yaw_rate_radps),
+        steering_rad: pick(&all.steering_rad),
+        ..StateSequence::default()
+    }
+}
+
+fn answer(sequence: &StateSequence) -> Result<Diagnosis, GapError> {
+    let vehicle = nominal(&CarParameters::by_name("f1tenth").unwrap());
+    let only = ["v_y_bias".to_owned(), "steering_offset".to_owned(), "gyro_bias".to_owned()];
+    diagnose(&Request { only: &only, ..Request::new(sequence, &vehicle) }, &mut |_| {})
+}
+
+/// The bias leads the ranking with its size inside. So little data may leave it a candidate, and the verdict open.
+fn finds_the_bias(d: &Diagnosis) {
+    assert_eq!(d.effects[0].name, "v_y_bias", "{}", d.text());
+    let bias = &d.effects[0].parameters["bias_mps"];
+    assert!(bias.low < BIAS_MPS && BIAS_MPS < bias.high, "{bias:?}");
+    assert!(d.effects[0].accepted || d.verdict == Verdict::NoneOfThese, "{}", d.text());
+}
+
+#[test]
+fn ten_seconds_are_scored_on_what_was_fitted_and_say_so() {
+    let d = answer(&picked(|_, t| t < 10.0)).unwrap();
+    assert!(d.gap.scored_on.contains("too little data to hold any out"), "{}", d.gap.scored_on);
+    assert!(d.text().contains("too little data to hold any out"));
+    assert!(d.gap_closed_fraction.low < d.gap_closed_fraction.value || d.gap_closed_fraction.value.is_nan());
+}
+
+#[test]
+fn twenty_hertz_are_enough_for_a_bias() {
+    let d = answer(&picked(|k, _| k % 5 == 0)).unwrap();
+    assert!((d.data_health.rate_hz - 20.0).abs() < 0.1);
+    finds_the_bias(&d);
+}
+
+#[test]
+fn a_gap_is_stated_and_not_bridged() {
+    let d = answer(&picked(|_, t| !(8.0..11.0).contains(&t))).unwrap();
+    assert_eq!(d.data_health.gaps.len(), 1);
+    assert!(d.text().contains("1 gaps"));
+    let inside = |p: &&gripsight_gap::Prediction| (8.1..10.9).contains(&p.time_s);
+    assert_eq!(d.series.predictions.iter().filter(inside).count(), 0);
+    finds_the_bias(&d);
+}
+
+#[test]
+fn a_stop_is_left_out() {
+    let mut stopped = picked(|_, _| true);
+    for k in 0..stopped.len() {
+        if (9.0..15.0).contains(&stopped.time_s[k]) {
+            stopped.v_x_mps[k] = 0.0;
+            stopped.v_y_mps[k] = BIAS_MPS as f32;
+            stopped.yaw_rate_radps[k] = 0.0;
+        }
+    }
+    let d = answer(&stopped).unwrap();
+    assert!(d.data_health.moving_share < 0.8, "{}", d.data_health.moving_share);
+    let inside = |p: &&gripsight_gap::Prediction| (9.6..14.4).contains(&p.time_s);
+    assert_eq!(d.series.predictions.iter().filter(inside).count(), 0);
+    finds_the_bias(&d);
+}
+
+#[test]
+fn a_number_that_is_none_is_named_with_its_place() {
+    let mut broken = picked(|_, _| true);
+    broken.v_y_mps[700] = f32::NAN;
+    let error = answer(&broken).unwrap_err().to_string();
+    assert!(error.contains("v_y_mps") && error.contains("700"), "{error}");
+}
+
+#[test]
+fn a_straight_says_what_to_drive() {
+    let all = picked(|_, _| true);
+    let level = StateSequence {
+        v_y_mps: (0..all.len()).map(|k| 0.002 * (k % 5) as f32).collect(),
+        yaw_rate_radps: (0..all.len()).map(|k| 0.001 * (k % 3) as f32).collect(),
+        steering_rad: vec![0.0; all.len()],
+        ..all
+    };
+    let d = answer(&level).unwrap();
+    assert_eq!(d.verdict, Verdict::NotIdentifiable);
+    assert!(d.reasons[0].contains("cornering says nothing"), "{}", d.reasons[0]);
+    assert!(d.drive_next[0].contains("corners to both sides"), "{}", d.drive_next[0]);
+}
