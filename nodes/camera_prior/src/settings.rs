@@ -112,10 +112,10 @@ pub(crate) fn declare(node: &mut Node) -> anyhow::Result<Configuration> {
             )?,
         },
         model: ModelLimits {
-            most_entropy: number(
-                "most_entropy",
-                doubt.most_entropy,
-                "Largest entropy of p that is believed, of 1",
+            most_least_probability: number(
+                "most_least_probability",
+                doubt.most_least_probability,
+                "Largest p of the least likely state that is believed",
                 0.0,
                 1.0,
             )?,

@@ -29,20 +29,25 @@ CHUNK, VALIDATION, VALIDATION_SEED = 500, 1600, 101
 MU_WEIGHT = 30.0
 
 
+def halves(net):
+    """The blocks that stay and those that are fitted, which share their layers with `net`."""
+    return net.features[:FROZEN], nn.Sequential(net.features[FROZEN:], net.avgpool, nn.Flatten(), net.classifier)
+
+
 @torch.no_grad()
-def answers(front, data, count, name, cache):
+def answers(front, data, count, name, cache, chunk=CHUNK):
     """What `front` answers to the first `count` pictures of `data`, their targets, and which of them are roads."""
     parts = []
-    for first in range(0, count, CHUNK):
+    for first in range(0, count, chunk):
         file = cache / f"{name}_{first}.pt"
         if not file.exists():
-            items = [data.picture(i) for i in range(first, first + CHUNK)]
+            items = [data.picture(i) for i in range(first, min(first + chunk, count))]
             tensors = torch.stack([to_tensor(p) for p, *_ in items]).to(memory_format=torch.channels_last)
             answer = torch.cat([front(x) for x in tensors.split(50)]).to(torch.bfloat16)
             targets = torch.from_numpy(np.stack([f for _, f, *_ in items]))
             torch.save((answer, targets, torch.tensor([kind == 0 for *_, kind, _ in items])), file)
         parts.append(torch.load(file))
-    return [torch.cat(part)[:count] for part in zip(*parts)]
+    return [torch.cat(part) for part in zip(*parts)]
 
 
 @torch.no_grad()
@@ -70,7 +75,7 @@ def main():
     torch.set_num_threads(1)
     net = build("mobilenet_v3_small").to(memory_format=torch.channels_last).eval()
     net.load_state_dict(averaged(args.weights, args.shares))
-    front, tail = net.features[:FROZEN], nn.Sequential(net.features[FROZEN:], net.avgpool, nn.Flatten(), net.classifier)
+    front, tail = halves(net)
     shown = Renders(args.photographs, "train", 224, args.pictures, args.seed, procedural_share=0.1, plain_share=0.1, finer_share=0.25)
     held = Renders(args.photographs, "val", 224, VALIDATION, VALIDATION_SEED, outliers=False, procedural_share=0.0)
     held_x, held_target, _ = answers(front, held, VALIDATION, "val", args.cache)
@@ -96,7 +101,7 @@ def main():
         rows.append((epoch, *validate(average, held_x, held_target)))
         print(*rows[-1], flush=True)
     for own, kept in zip(tail.parameters(), average.parameters()):
-        own.data.copy_(kept)  # the tail's layers are the network's own
+        own.data.copy_(kept)
     torch.save(net.state_dict(), args.out / "last.pt")
     with open(args.out / "log.csv", "w", newline="") as f:
         csv.writer(f).writerows([("epoch", "val_loss", "val_rmse"), *rows])

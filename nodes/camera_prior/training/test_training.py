@@ -8,8 +8,9 @@ import torch
 from PIL import Image
 
 import degradations
+import refit
 import train
-from data import Rscd, finer, plain, rscd_class
+from data import Rscd, finer, plain, rscd_class, to_tensor
 from export import averaged
 from model import BASIS, build, flops, load_weights
 from noise import Bank
@@ -154,3 +155,19 @@ def test_the_papers_counts_are_torchvisions_with_five_classes():
         net = build(name)
         assert sum(w.numel() for w in net.parameters()) / 1e6 == pytest.approx(parameters, abs=0.01)
         assert flops(net) / 1e9 == pytest.approx(gflop, rel=0.1)
+
+
+def test_a_refit_s_halves_are_the_whole_network_and_its_cache_is_found_again(tmp_path):
+    class Made:
+        def picture(self, i):
+            return (*render(np.random.default_rng(i), BANK, 64), i % 2, "made")
+
+    net = build("mobilenet_v3_small").eval()
+    front, tail = refit.halves(net)
+    x, target, road = refit.answers(front, Made(), 6, "made", tmp_path, chunk=3)
+    pictures = torch.stack([to_tensor(Made().picture(i)[0]) for i in range(6)])
+    with torch.no_grad():
+        assert torch.allclose(tail(x.float()), net(pictures), atol=0.02)
+    assert road.tolist() == [True, False] * 3 and np.allclose(target.sum(1), 1)
+    again = refit.answers(None, None, 6, "made", tmp_path, chunk=3)
+    assert all((a == b).all() for a, b in zip(again, (x, target, road)))

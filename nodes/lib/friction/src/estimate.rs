@@ -28,7 +28,7 @@ pub enum Reason {
     Noisy,
     /// Blurred or blank.
     Blurred,
-    /// The network cannot decide: the entropy of p is too high.
+    /// The network cannot decide: it holds every state possible.
     Undecided,
     /// Unlike the pictures trained on: the energy of the logits is too high.
     Unfamiliar,

@@ -167,7 +167,7 @@ impl FrictionEstimator {
         let entropy =
             -p.iter().filter(|p| **p > 0.0).map(|p| p * p.ln()).sum::<f64>() / (classes as f64).ln();
         let limits = &self.settings.model;
-        let refused = if entropy > limits.most_entropy {
+        let refused = if p.iter().all(|p| *p > limits.most_least_probability) {
             Some(Reason::Undecided)
         } else if energy > limits.most_energy {
             Some(Reason::Unfamiliar)

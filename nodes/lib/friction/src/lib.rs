@@ -10,7 +10,7 @@
 //!
 //! A network always answers, also about a covered lens. So a picture passes gates before it counts, in this order:
 //! transport (age, layout, a frozen camera), quality of the picture (dark, saturated, noisy, blurred), the network's own
-//! doubt (entropy, energy); then p is averaged over the distance travelled. What fails a gate yields `valid = false`, its
+//! doubt (no state out of the question, energy); then p is averaged over the distance travelled. What fails a gate yields `valid = false`, its
 //! [`Reason`] and the uninformative prior: never zero, never the last value.
 //!
 //! [`FrictionEstimator`] is the whole pipeline. Nothing here reads a clock or the environment: stamps, distances and folders

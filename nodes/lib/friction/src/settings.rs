@@ -39,14 +39,14 @@ impl Default for Settings {
 /// Limits of the gate on the network's own doubt; set on validation pictures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModelLimits {
-    /// Largest entropy of p, as a share of that of a uniform p.
-    pub most_entropy: f64,
+    /// Largest p of the least likely state: on a road some state is out of the question, before a bad picture none is.
+    pub most_least_probability: f64,
     /// Largest energy, -ln sum exp z.
     pub most_energy: f64,
 }
 
 impl Default for ModelLimits {
     fn default() -> Self {
-        Self { most_entropy: 0.85, most_energy: -1.7 }
+        Self { most_least_probability: 0.07, most_energy: -1.7 }
     }
 }
