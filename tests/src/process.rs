@@ -109,6 +109,18 @@ impl Process {
         assert!(status.success(), "cannot signal {}", self.name);
     }
 
+    /// The most memory that the running process has held so far.
+    ///
+    /// # Panics
+    /// When it has ended.
+    pub fn peak_memory_mb(&self) -> f64 {
+        let status =
+            std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).expect("a running process");
+        let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).expect("VmHWM");
+        let kb: f64 = peak.trim().trim_end_matches(" kB").parse().expect("a number of kB");
+        kb / 1e3
+    }
+
     /// Waits for the end of the process.
     ///
     /// # Panics

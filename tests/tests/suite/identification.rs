@@ -19,9 +19,19 @@ const PRIOR: (f64, f64) = (0.9, 0.2);
 
 /// A drive of the reference car: bag and vehicle file.
 fn drive(folder: &Path) -> (PathBuf, PathBuf) {
+    simulate(folder, &["--duration", "32", "--seed", "11", "--pace", "0.9"])
+}
+
+/// A drive as `gripsight simulate` makes it: bag and vehicle file.
+pub(crate) fn simulate(folder: &Path, arguments: &[&str]) -> (PathBuf, PathBuf) {
     let bag = folder.join("drive.mcap");
-    let arguments = ["simulate", "--duration", "32", "--seed", "11", "--pace", "0.9", "--out"];
-    let output = Command::new(program("gripsight")).args(arguments).arg(&bag).output().unwrap();
+    let output = Command::new(program("gripsight"))
+        .arg("simulate")
+        .args(arguments)
+        .arg("--out")
+        .arg(&bag)
+        .output()
+        .unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     (bag, folder.join("drive.vehicle.yaml"))
 }

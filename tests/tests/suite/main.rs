@@ -4,6 +4,7 @@
 
 mod bag_player;
 mod camera_prior;
+mod gap_diagnosis;
 mod identification;
 mod runtime;
 mod sim_car;

@@ -57,7 +57,7 @@ fn shape(name: &str) -> Option<Shape> {
         "bean" => Shape { size_m: 210.0, cosines: &[(1, 0.32), (2, -0.24)], sines: &[(3, 0.08)] },
         "clover" => Shape { size_m: 220.0, cosines: &[(3, 0.24), (2, 0.1)], sines: &[(5, 0.04)] },
         "harbor" => Shape { size_m: 205.0, cosines: &[(2, 0.2), (4, 0.05)], sines: &[(1, 0.15), (3, 0.1)] },
-        "valley" => Shape { size_m: 215.0, cosines: &[(1, 0.2), (3, 0.14)], sines: &[(2, 0.2), (5, 0.03)] },
+        "valley" => Shape { size_m: 225.0, cosines: &[(1, 0.2), (3, 0.12)], sines: &[(2, 0.18), (5, 0.02)] },
         _ => return None,
     };
     Some(shape)

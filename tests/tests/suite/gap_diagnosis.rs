@@ -1,0 +1,67 @@
+//! The diagnosis on topics: a replayed drive with a known effect in, reports over a moving window out, within bounds.
+
+use std::time::Duration;
+
+use gripsight_msgs::{GapReport, Message};
+use gripsight_tests::domain::Domain;
+use gripsight_tests::peers::{available, cyclone, start_cyclone};
+use gripsight_tests::process::node;
+use serde_json::Value;
+
+use super::identification::simulate;
+
+/// Two windows on one busy core.
+const RUN: Duration = Duration::from_secs(120);
+const EFFECT: &str = "steering_delay";
+const DELAY_S: f64 = 0.03;
+/// Of the whole process.
+const MOST_MEMORY_MB: f64 = 150.0;
+
+#[test]
+fn a_moving_window_of_a_replayed_drive_is_diagnosed_within_bounds() {
+    let Ok(python) = cyclone() else {
+        available(&[cyclone()]);
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let effect = format!("{EFFECT}={DELAY_S}");
+    let (bag, vehicle) = simulate(folder.path(), &["--effect", &effect, "--duration", "34", "--seed", "12"]);
+    let domain = Domain::new();
+    let vehicle = ["--params-file", vehicle.to_str().unwrap()];
+    let timeout = RUN.as_secs().to_string();
+    let listen = ["--qos", "reliable", "--count", "2", "--timeout", &timeout];
+    let reports = start_cyclone(
+        &domain,
+        &python,
+        &[&["subscribe", "/gap_diagnosis/report", GapReport::TYPE], &listen[..]].concat(),
+    );
+    let diagnosis =
+        node(&domain, "gap_diagnosis", &[&["-r", "sequence:=telemetry/sequence"], &vehicle[..]].concat());
+    let window = ["-p", "window_s:=20.0", "-p", "hop_s:=12.0", "-p", "reliable_inputs:=true"];
+    let topics = ["-r", "odom:=/car_state/odom", "-r", "imu:=/imu/data", "-r", "wheels:=/wheel_speeds"];
+    let _telemetry = node(&domain, "telemetry", &[&window[..], &topics[..], &vehicle[..]].concat());
+    let path = format!("bag:={}", bag.display());
+    let wait = "wait_for:=[/car_state/odom, /drive, /imu/data, /wheel_speeds]";
+    let _player = node(&domain, "bag_player", &["-p", &path, "-p", "rate:=2.0", "-p", wait]);
+
+    // Python writes NaN ("not stated") and Infinity (no limit), which are no JSON.
+    let report = || {
+        let line = reports.line(RUN).replace("NaN", "null").replace("Infinity", "null");
+        serde_json::from_str::<Value>(&line.replace("-null", "null")).unwrap()
+    };
+    let (first, second) = (report(), report());
+    let id = |report: &Value| report["handshake"]["sequence_id"].as_u64().unwrap();
+    assert!(id(&first) < id(&second));
+    for report in [&first, &second] {
+        let named = &report["effects"][0];
+        assert_eq!((&named["name"], &named["accepted"]), (&EFFECT.into(), &true.into()), "{report}");
+        let delay_s = |end: &str| named["parameters"][0]["estimate"][end].as_f64().unwrap();
+        // The plant's command is held between samples, which a delay includes.
+        assert!(delay_s("low") < DELAY_S + 0.01 && DELAY_S < delay_s("high"), "{named}");
+        let left = |model: &str| report[model]["value"].as_f64().unwrap();
+        assert!(left("gap_after") < left("gap_retuned"), "{report}");
+    }
+    let memory_mb = diagnosis.peak_memory_mb();
+    println!("gap_diagnosis: peak {memory_mb:.0} MB");
+    assert!(memory_mb < MOST_MEMORY_MB, "{memory_mb} MB");
+}
