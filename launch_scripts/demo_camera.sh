@@ -27,6 +27,10 @@ while (($#)); do
     esac
     shift 2
 done
+if [[ ! -x $bin/identifier ]]; then
+    echo "demo_camera: no nodes in $bin; build them: cargo build --release --workspace --bins" >&2
+    exit 1
+fi
 mkdir -p "$out"
 "$bin/gripsight" simulate --mu "$mu" --pace 0.9 --duration 31 --camera 5 --seed "$seed" --out "$out/drive.mcap"
 # The reference car's pictures show nothing but road: the region is all of them.
@@ -38,7 +42,7 @@ for camera in without with; do
     option=()
     if [[ $camera == with ]]; then option=(--camera); fi
     launch_scripts/run_suite.sh --vehicle "$out/drive.vehicle.yaml" --bag "$out/drive.mcap" --params "$out/params.yaml" \
-        --bin "$bin" "${option[@]}" 2> "$out/$camera.log"
+        --bin "$bin" "${option[@]}" 2> "$out/$camera.log" || { tail -n 5 "$out/$camera.log" >&2; exit 1; }
     sed -nE "s/.*sequence ([0-9]+): (accepted|rejected) after ([0-9]+) iterations; .* peak friction ([0-9.]+) \/ ([0-9.]+)(; (.*))?$/$camera,\1,\2,\3,\4,\5,\"\7\"/p" \
         "$out/$camera.log" >> "$out/runs.csv"
 done
