@@ -8,9 +8,10 @@ use gripsight_identification::shooting::Window;
 use gripsight_signals::StateSequence;
 use gripsight_vehicle::VehicleParameters;
 
-use crate::engine::{Engine, TireTrust};
+use crate::engine::Engine;
 use crate::recording::Recording;
 use crate::terms::Car;
+use crate::trust::TireTrust;
 use crate::{ExtendedModelFile, GapError};
 
 /// Time that both rollouts have to forget their start.

@@ -5,12 +5,13 @@ use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 
 use crate::budget::{Budget, Models, large_slip_rad};
 use crate::effects::{EffectId, Need};
-use crate::engine::{Engine, State, TireTrust};
+use crate::engine::{Engine, State};
 use crate::outcome::{DetectionLimit, Diagnosis, Invisible, TirePair, Unexplained};
 use crate::recording::Recording;
 use crate::rooms::{Left, explained};
 use crate::search::{Found, search};
 use crate::select::reweigh;
+use crate::trust::TireTrust;
 use crate::usable::{Usable, cannot_tell, refused, usable};
 use crate::verdict::{Remains, claims, decide, looks, rank};
 use crate::windows::{Windows, split};

@@ -10,14 +10,13 @@
 #[allow(dead_code)]
 mod support;
 
-use std::path::Path;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use gripsight_identification::{Config, FrictionPrior, Method, PerAxle, ResidualKind, identify};
 use gripsight_signals::StateSequence;
-use support::picture::{Line, draw};
-use support::{floor, reference_run, score};
+use support::picture::{Line, add, draw};
+use support::{floor, picture_and_seeds, reference_run, score};
 
 /// Test drives; odd ones go round the other way.
 const SEEDS: [u64; 4] = [76, 77, 78, 79];
@@ -49,12 +48,7 @@ fn first(whole: &StateSequence) -> StateSequence {
 }
 
 fn main() -> Result<()> {
-    let mut arguments = std::env::args().skip(1);
-    let picture = arguments.next().context("where to draw the picture?")?;
-    let mut seeds = arguments.map(|seed| seed.parse()).collect::<Result<Vec<u64>, _>>()?;
-    if seeds.is_empty() {
-        seeds = SEEDS.to_vec();
-    }
+    let (picture, seeds) = picture_and_seeds(&SEEDS)?;
     println!(
         "seed,data,network,prior,rmse_front,rmse_rear,floor_front,floor_rear,turns,converged,seconds,turns_at_0.02,turns_at_0.05,slip_front,slip_rear"
     );
@@ -96,13 +90,10 @@ fn main() -> Result<()> {
                     );
                     let with = if prior == "none" { "" } else { ", prior" };
                     let name = format!("{network}, {data} drive{with}");
-                    match lines.iter_mut().find(|line| line.name == name) {
-                        Some(line) => line.rmse.push(rmse),
-                        None => lines.push(Line { name, rmse: vec![rmse] }),
-                    }
+                    add(&mut lines, name, rmse);
                 }
             }
         }
     }
-    draw("The paper's procedure", &lines, floors, Path::new(&picture))
+    draw("The paper's procedure", &lines, floors, &picture)
 }

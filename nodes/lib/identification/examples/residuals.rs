@@ -10,13 +10,12 @@
 #[allow(dead_code)]
 mod support;
 
-use std::path::Path;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use gripsight_identification::{Config, FrictionPrior, ResidualKind, identify};
-use support::picture::{Line, draw};
-use support::{floor, reference_run, score};
+use support::picture::{Line, add, draw};
+use support::{floor, picture_and_seeds, reference_run, score};
 
 /// Test drives; odd ones go round the other way.
 const SEEDS: [u64; 6] = [70, 71, 72, 73, 74, 75];
@@ -42,12 +41,7 @@ fn name(residual: ResidualKind, direct_start: bool) -> String {
 }
 
 fn main() -> Result<()> {
-    let mut arguments = std::env::args().skip(1);
-    let picture = arguments.next().context("where to draw the picture?")?;
-    let mut seeds = arguments.map(|seed| seed.parse()).collect::<Result<Vec<u64>, _>>()?;
-    if seeds.is_empty() {
-        seeds = SEEDS.to_vec();
-    }
+    let (picture, seeds) = picture_and_seeds(&SEEDS)?;
     println!(
         "seed,method,prior,rmse_front,rmse_rear,floor_front,floor_rear,rollout_v_y_mps,rollout_yaw_rate_radps,turns,converged,source,accepted,seconds"
     );
@@ -79,12 +73,9 @@ fn main() -> Result<()> {
                     outcome.accepted
                 );
                 let name = if prior == "none" { method } else { format!("{method}, prior") };
-                match lines.iter_mut().find(|line| line.name == name) {
-                    Some(line) => line.rmse.push(rmse),
-                    None => lines.push(Line { name, rmse: vec![rmse] }),
-                }
+                add(&mut lines, name, rmse);
             }
         }
     }
-    draw("Least squares and residual networks", &lines, floors, Path::new(&picture))
+    draw("Least squares and residual networks", &lines, floors, &picture)
 }

@@ -11,6 +11,14 @@ pub(crate) struct Line {
     pub(crate) rmse: Vec<[f64; 2]>,
 }
 
+/// Adds a drive to the line of a name, which is made where there is none.
+pub(crate) fn add(lines: &mut Vec<Line>, name: String, rmse: [f64; 2]) {
+    match lines.iter_mut().find(|line| line.name == name) {
+        Some(line) => line.rmse.push(rmse),
+        None => lines.push(Line { name, rmse: vec![rmse] }),
+    }
+}
+
 const HEIGHT: u32 = 26;
 const MARGIN: u32 = 96;
 /// Ends of the axis of errors.
