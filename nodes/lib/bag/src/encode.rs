@@ -12,6 +12,7 @@ use gripsight_signals::{DriveSample, ImuSample, OdometrySample, WheelsSample};
 pub const WHEEL_JOINTS: [&str; 4] = ["wheel_fl", "wheel_fr", "wheel_rl", "wheel_rr"];
 
 const NS_PER_S: i64 = 1_000_000_000;
+const STANDARD_GRAVITY_MPS2: f64 = 9.806_65;
 
 /// A ROS stamp; a time beyond its range (the year 2038) becomes its end.
 #[must_use]
@@ -57,7 +58,7 @@ pub fn drive(sample: &DriveSample) -> AckermannDriveStamped {
     }
 }
 
-/// An inertial reading without orientation (covariance -1: not measured).
+/// An inertial reading on a level road, gravity alone upward, without orientation (covariance -1: not measured).
 #[must_use]
 pub fn imu(sample: &ImuSample) -> Imu {
     let mut message = Imu { header: header(sample.stamp_ns, "base_link"), ..Imu::default() };
@@ -66,6 +67,7 @@ pub fn imu(sample: &ImuSample) -> Imu {
     message.angular_velocity.z = sample.yaw_rate_radps;
     message.linear_acceleration.x = sample.a_x_mps2;
     message.linear_acceleration.y = sample.a_y_mps2;
+    message.linear_acceleration.z = STANDARD_GRAVITY_MPS2;
     message
 }
 

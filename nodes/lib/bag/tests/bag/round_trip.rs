@@ -135,6 +135,7 @@ fn wheels_are_found_by_name() {
 fn a_sensor_that_says_not_measured_gives_no_sample() {
     let mut message = encode::imu(&imu(3));
     assert!(decode::imu(&message).is_some());
+    assert_eq!(message.linear_acceleration.z, 9.806_65, "a sensor at rest reads gravity upward");
     message.linear_acceleration_covariance[0][0] = -1.0;
     assert_eq!(decode::imu(&message), None);
 }
