@@ -123,8 +123,10 @@ def subscribe(participant, args):
     def take():
         nonlocal received
         for message in reader.take(N=100):
-            show(message)
-            received += 1
+            # Also reported, without data: that the writer has gone.
+            if message.sample_info.valid_data:
+                show(message)
+                received += 1
         return received >= args.count
 
     return wait_until(take, args.timeout)
@@ -163,7 +165,12 @@ def call(participant, args):
     time.sleep(0.2)
     reader = DataReader(participant, Topic(participant, f"rr{args.topic}Reply", reply_type), qos("reliable"))
     replies = []
-    if not wait_until(lambda: replies.extend(r for r in reader.take(N=10) if r.guid == 4711) or replies, args.timeout):
+
+    def take():
+        replies.extend(r for r in reader.take(N=10) if r.sample_info.valid_data and r.guid == 4711)
+        return replies
+
+    if not wait_until(take, args.timeout):
         return False
     show(replies[0])
     return True
