@@ -239,21 +239,24 @@ impl Identification {
     }
 }
 
-/// Where a run starts: the previous set, or the configured tires; D from the friction prior where there is one.
+/// Where a run starts: the previous set, or the configured tires with D from the friction prior where there is one. The paper's D_initial = mu_hat
+/// leaves B, C and E as they are; the robust method keeps the stiffness, of which a friction prior says nothing.
 fn initial_tires(
     prior: Option<FrictionPrior>,
     previous: Option<&AcceptedSet>,
     config: &Config,
 ) -> PacejkaParameters {
-    let Some(previous) = previous else {
-        let start = |axle: &MagicFormula| match prior {
-            // At the same stiffness: a friction prior says nothing about it.
-            Some(p) => MagicFormula::from_stiffness(axle.normalized_stiffness(), axle.c, p.mu, axle.e),
-            None => *axle,
-        };
-        return PacejkaParameters { front: start(&config.initial.front), rear: start(&config.initial.rear) };
+    if let Some(previous) = previous {
+        return previous.phi_p;
+    }
+    let start = |axle: &MagicFormula| match (prior, config.method) {
+        (None, _) => *axle,
+        (Some(p), Method::Paper) => MagicFormula { d: p.mu, ..*axle },
+        (Some(p), Method::Robust) => {
+            MagicFormula::from_stiffness(axle.normalized_stiffness(), axle.c, p.mu, axle.e)
+        }
     };
-    previous.phi_p
+    PacejkaParameters { front: start(&config.initial.front), rear: start(&config.initial.rear) }
 }
 
 fn check(
@@ -317,5 +320,21 @@ pub fn identify(
         if let Next::Done(outcome) = run.advance(&model)? {
             return Ok(*outcome);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_prior_sets_d_alone_in_the_paper_s_method_and_keeps_the_stiffness_in_the_robust_one() {
+        let prior = Some(FrictionPrior { mu: 0.8, sigma: 0.1 });
+        let of = |prior, method| initial_tires(prior, None, &Config { method, ..Config::default() }).front;
+        let without = of(None, Method::Paper);
+        assert_eq!(of(prior, Method::Paper), MagicFormula { d: 0.8, ..without });
+        let robust = of(prior, Method::Robust);
+        assert!((robust.normalized_stiffness() - without.normalized_stiffness()).abs() < 1e-12);
+        assert_eq!((robust.c, robust.d, robust.e), (without.c, 0.8, without.e));
     }
 }
