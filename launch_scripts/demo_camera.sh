@@ -1,27 +1,34 @@
 #!/usr/bin/env bash
-# The warm start at work: one drive of the reference car through the suite's nodes, first without its camera, then with it.
+# The warm start at work: drives of the reference car through the suite's nodes, first without its camera, then with it.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 usage() {
     cat <<'TEXT'
-Usage: launch_scripts/demo_camera.sh [--out FOLDER] [--bin FOLDER] [--mu MU] [--seed N]
+Usage: launch_scripts/demo_camera.sh [options]
 
-Drives the reference car (gripsight simulate --camera), plays the bag to the nodes twice, and prints what the identifier
-says of every sequence: from its own start, D = 0.51, and from the camera's prior.
+Drives the reference car on roads whose pictures match their friction (gripsight simulate --camera), plays each bag to
+the nodes twice, and records what they say: once from mu0 = 0.51, once from the camera's prior. Then prints a table of
+the turns of the outer loop. Needs what launch_scripts/setup.sh --tests installs (a DDS peer records).
 
-  --out FOLDER     bag, logs and runs.csv   [out/demo_camera]
-  --bin FOLDER     the built binaries       [target/release]
+  --method METHOD     paper or robust                                              [paper]
+  --window SECONDS    how much of the drive is identified from                     [9: the first acceleration]
+  --mu "MU..."        the roads' friction                                          [0.85 0.80 0.60]
+  --seeds "N..."      drives on each; odd ones go round the other way              [81 82 83 84]
+  --out FOLDER        bags, recordings, logs and runs.csv                          [out/demo_camera]
+  --bin FOLDER        the built binaries                                           [target/release]
 TEXT
 }
 
-out=out/demo_camera bin=target/release mu=0.85 seed=61
+method=paper window=9 mus='0.85 0.80 0.60' seeds='81 82 83 84' out=out/demo_camera bin=target/release
 while (($#)); do
     case $1 in
+        --method) method=$2 ;;
+        --window) window=$2 ;;
+        --mu) mus=$2 ;;
+        --seeds) seeds=$2 ;;
         --out) out=$2 ;;
         --bin) bin=$2 ;;
-        --mu) mu=$2 ;;
-        --seed) seed=$2 ;;
         -h | --help) usage; exit 0 ;;
         *) echo "demo_camera: unknown option '$1'" >&2; usage >&2; exit 2 ;;
     esac
@@ -31,20 +38,48 @@ if [[ ! -x $bin/identifier ]]; then
     echo "demo_camera: no nodes in $bin; build them: cargo build --release --workspace --bins" >&2
     exit 1
 fi
+python=.venv/bin/python
+if [[ ! -x $python ]]; then
+    echo "demo_camera: no $python; run launch_scripts/setup.sh --tests" >&2
+    exit 1
+fi
+export ROS_DOMAIN_ID=${ROS_DOMAIN_ID:-42}
 mkdir -p "$out"
-"$bin/gripsight" simulate --mu "$mu" --pace 0.9 --duration 31 --camera 5 --seed "$seed" --out "$out/drive.mcap"
 # The reference car's pictures show nothing but road: the region is all of them.
-cp params/suite.yaml "$out/params.yaml"
+sed -E "s/^( *method:) .*/\1 $method/; s/^( *window_s:) .*/\1 $window.0/; s/^( *hop_s:) .*/\1 $window.0/" params/suite.yaml > "$out/params.yaml"
 printf '\ncamera_prior:\n  ros__parameters:\n    region: [0.0, 0.0, 1.0, 1.0]\n' >> "$out/params.yaml"
 
-echo "camera,sequence,result,iterations,peak_friction_front,peak_friction_rear,reasons" > "$out/runs.csv"
-for camera in without with; do
-    option=()
-    if [[ $camera == with ]]; then option=(--camera); fi
-    launch_scripts/run_suite.sh --vehicle "$out/drive.vehicle.yaml" --bag "$out/drive.mcap" --params "$out/params.yaml" \
-        --bin "$bin" "${option[@]}" 2> "$out/$camera.log" || { tail -n 5 "$out/$camera.log" >&2; exit 1; }
-    sed -nE "s/.*sequence ([0-9]+): (accepted|rejected) after ([0-9]+) iterations; .* peak friction ([0-9.]+) \/ ([0-9.]+)(; (.*))?$/$camera,\1,\2,\3,\4,\5,\"\7\"/p" \
-        "$out/$camera.log" >> "$out/runs.csv"
+# One drive through the suite; the recorder ends with the first run of the identification.
+play() {
+    local drive=$1 recording=$2 suite status=0
+    shift 2
+    : > "$recording.ready"
+    "$python" tests/peers/record.py "$recording.mcap" > "$recording.ready" &
+    local recorder=$!
+    until grep -q ready "$recording.ready"; do sleep 0.1; done
+    launch_scripts/run_suite.sh --vehicle "$drive.vehicle.yaml" --bag "$drive.mcap" --params "$out/params.yaml" \
+        --bin "$bin" --linger 120 "$@" 2> "$recording.log" &
+    suite=$!
+    wait "$recorder" || status=$?
+    kill -TERM "$suite" 2>/dev/null || true
+    wait "$suite" || true
+    if ((status)); then
+        echo "demo_camera: no end of the run in $recording.mcap" >&2
+        tail -n 5 "$recording.log" >&2
+        exit 1
+    fi
+}
+
+for mu in $mus; do
+    for seed in $seeds; do
+        drive=$out/mu${mu}_seed$seed reverse=()
+        if ((seed % 2)); then reverse=(--reverse); fi
+        "$bin/gripsight" simulate --mu "$mu" --realistic --pace 0.9 --duration "$((window + 1))" --camera 5 --seed "$seed" \
+            "${reverse[@]}" --out "$drive.mcap" > "$drive.log" 2>&1
+        play "$drive" "$drive.without"
+        play "$drive" "$drive.with" --camera
+        echo "mu $mu, seed $seed: recorded" >&2
+    done
 done
-printf '\nTrue friction: %s\n' "$mu"
-cat "$out/runs.csv"
+"$python" tests/results/camera_prior/warm_start.py rows "$out" > "$out/runs.csv"
+"$python" tests/results/camera_prior/warm_start.py table "$out/runs.csv"
