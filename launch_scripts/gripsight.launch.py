@@ -65,7 +65,10 @@ def nodes(context):
 
     started = [
         node("telemetry", remaps("odom", "drive", "imu", "wheels")),
-        node("s4_residual", [("sequence", "telemetry/sequence"), ("candidate", "identifier/candidate")]),
+        node(
+            "s4_residual",
+            [*remaps("odom", "drive"), ("sequence", "telemetry/sequence"), ("candidate", "identifier/candidate")],
+        ),
         node(
             "identifier",
             [

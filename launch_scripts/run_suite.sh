@@ -89,10 +89,11 @@ trap 'exit 143' TERM
 replay=()
 if [[ -n $bag ]]; then replay=(-p reliable_inputs:=true -p use_sim_time:=true); fi
 mapfile -t car < <(remaps odom drive imu wheels)
+mapfile -t motion < <(remaps odom drive)
 mapfile -t eyes < <(remaps odom image image/compressed)
 
 start telemetry "${car[@]}" "${replay[@]}"
-start s4_residual -r sequence:=telemetry/sequence -r candidate:=identifier/candidate "${replay[@]}"
+start s4_residual "${motion[@]}" -r sequence:=telemetry/sequence -r candidate:=identifier/candidate "${replay[@]}"
 start identifier -r sequence:=telemetry/sequence -r model:=s4_residual/model -r friction:=camera_prior/friction "${replay[@]}"
 if $camera; then
     defaults=(--params-file "$root/params/camera_prior.yaml")

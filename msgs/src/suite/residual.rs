@@ -69,7 +69,7 @@ pub struct Residual {
     pub header: Header,
     /// The model in use.
     pub handshake: Handshake,
-    /// Time from the sample before (s).
+    /// Time from the sample that the prediction starts from (s).
     pub dt_s: f64,
     /// Measured less single-track model, lateral speed (m/s).
     pub v_y_nominal_mps: f64,

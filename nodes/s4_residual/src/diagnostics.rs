@@ -31,6 +31,8 @@ pub(crate) struct Figures {
     pub(crate) sequences: usize,
     /// Models published.
     pub(crate) models: usize,
+    /// Live residuals published.
+    pub(crate) residuals: usize,
     /// Time of the last training, s.
     pub(crate) last_training_s: f64,
     /// Loss of the last model on the part held back.
@@ -50,6 +52,7 @@ pub(crate) fn status(activity: &Activity, figures: &Figures) -> Status {
     Status::new(level, text)
         .value("sequences held", figures.sequences)
         .value("models published", figures.models)
+        .value("live residuals published", figures.residuals)
         .value("last training [s]", format!("{:.3}", figures.last_training_s))
         .value("last validation loss", format!("{:.4}", figures.last_validation_loss))
 }

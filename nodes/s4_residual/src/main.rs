@@ -1,6 +1,7 @@
 //! Node: state sequences and a candidate to a learned residual model. See the README beside this folder.
 
 mod diagnostics;
+mod live;
 mod node;
 mod recent;
 

@@ -5,19 +5,22 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use gripsight_bag::Reassembler;
+use gripsight_bag::{Reassembler, decode};
 use gripsight_identification::{
-    Candidate, Config, IdentificationError, Method, ResidualKind, ResidualModel, RunKey, train_residual,
-    vehicle_hash,
+    Candidate, Config, IdentificationError, Method, ResidualKind, ResidualModel, RunKey, SignalCorrections,
+    train_residual, vehicle_hash,
 };
 use gripsight_identification_messages as messages;
+use gripsight_msgs::standard::ackermann_msgs::AckermannDriveStamped;
+use gripsight_msgs::standard::nav_msgs::Odometry;
 use gripsight_msgs::{PacejkaParams, ResidualModel as ModelMessage, StateSequence as SequenceMessage};
 use gripsight_runtime::{Descriptor, Node, Publisher, Qos, vehicle_parameters};
-use gripsight_signals::StateSequence;
+use gripsight_signals::{Measurement, StateSequence};
 use gripsight_vehicle::VehicleParameters;
 use tokio::task::JoinHandle;
 
 use crate::diagnostics::{Activity, Figures, status};
+use crate::live::Live;
 use crate::recent::Recent;
 
 /// Sequences and models kept for candidates that come late or again.
@@ -47,6 +50,9 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
     };
     let mut sequences = node.subscription::<SequenceMessage>("sequence", Qos::latched().with_depth(64))?;
     let mut candidates = node.subscription::<PacejkaParams>("candidate", Qos::latched())?;
+    let sensor = node.sensor_qos(50);
+    let mut odometry = node.subscription::<Odometry>("odom", sensor)?;
+    let mut drive = node.subscription::<AckermannDriveStamped>("drive", sensor)?;
     let mut learner = Learner {
         hash: vehicle_hash(&vehicle),
         vehicle: Arc::new(vehicle),
@@ -59,6 +65,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
         activity: Activity::Idle,
         figures: Figures::default(),
         output: node.publisher("~/model", Qos::latched())?,
+        live: Live::new(node.publisher("~/residual", Qos::reliable(10))?),
     };
     let diagnostics = node.diagnostics();
 
@@ -67,10 +74,17 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
         loop {
             tokio::select! {
                 Some(message) = sequences.next() => learner.take_sequence(message).await,
+                Some(message) = odometry.next() => {
+                    learner.live.take(Measurement::Odometry(decode::odometry(&message))).await;
+                }
+                Some(message) = drive.next() => {
+                    learner.live.take(Measurement::Drive(decode::drive(&message))).await;
+                }
                 Some(message) = candidates.next() => learner.take_candidate(&message).await,
                 trained = ended(&mut learner.training) => learner.take_result(trained).await,
                 _ = ticks.tick() => {
                     learner.figures.sequences = learner.sequences.len();
+                    learner.figures.residuals = learner.live.published;
                     diagnostics.report("residual", status(&learner.activity, &learner.figures));
                 }
                 else => return Ok(()),
@@ -84,6 +98,7 @@ type Trained = (Result<ResidualModel, IdentificationError>, Duration);
 /// A training under way on a thread of its own.
 struct Training {
     key: RunKey,
+    corrections: SignalCorrections,
     stop: Arc<AtomicBool>,
     task: JoinHandle<Trained>,
 }
@@ -116,6 +131,7 @@ struct Learner {
     activity: Activity,
     figures: Figures,
     output: Publisher<ModelMessage>,
+    live: Live,
 }
 
 impl Learner {
@@ -165,7 +181,7 @@ impl Learner {
 
     fn train(&self, sequence: Arc<StateSequence>, candidate: Candidate) -> Training {
         let stop = Arc::new(AtomicBool::new(false));
-        let key = candidate.key.clone();
+        let (key, corrections) = (candidate.key.clone(), candidate.corrections);
         let (vehicle, config) = (Arc::clone(&self.vehicle), self.config.clone());
         let stopped = Arc::clone(&stop);
         let task = tokio::task::spawn_blocking(move || {
@@ -179,11 +195,11 @@ impl Learner {
             });
             (result, start.elapsed())
         });
-        Training { key, stop, task }
+        Training { key, corrections, stop, task }
     }
 
     async fn take_result(&mut self, ended: Result<Trained, tokio::task::JoinError>) {
-        self.training = None;
+        let corrections = self.training.take().map(|training| training.corrections);
         match ended {
             Ok((Ok(model), took)) => {
                 self.figures.models += 1;
@@ -197,6 +213,9 @@ impl Learner {
                     took.as_secs_f64(),
                     model.validation_loss
                 );
+                if let Some(corrections) = corrections {
+                    self.live.follow(&self.vehicle, &model, corrections);
+                }
                 let message = messages::residual_model(&model, took.as_secs_f64());
                 self.output.publish(&message).await;
                 self.models.put(model.key, message);

@@ -7,7 +7,7 @@ use std::time::Duration;
 use gripsight_bag::{BagWriter, Reassembler};
 use gripsight_msgs::standard::ackermann_msgs::AckermannDriveStamped;
 use gripsight_msgs::standard::nav_msgs::Odometry;
-use gripsight_msgs::{MagicFormula, Message, PacejkaParams, StateSequence};
+use gripsight_msgs::{MagicFormula, Message, PacejkaParams, Residual, StateSequence};
 use gripsight_tests::domain::Domain;
 use gripsight_tests::peers::{PATIENCE, available, cyclone, fast_dds, message, start_built, start_cyclone};
 use gripsight_tests::process::{Process, node, program};
@@ -37,18 +37,28 @@ pub(crate) fn simulate(folder: &Path, arguments: &[&str]) -> (PathBuf, PathBuf) 
 }
 
 /// telemetry, s4_residual and identifier, joined as the launchers join them.
-fn suite(domain: &Domain, vehicle: &Path) -> [Process; 3] {
+fn suite(domain: &Domain, vehicle: &Path, window_s: &str) -> [Process; 3] {
     let vehicle = vehicle.to_str().unwrap();
     let start = |name: &str, arguments: &[&str]| {
         node(domain, name, &[arguments, &["--params-file", vehicle]].concat())
     };
-    let window = ["-p", "window_s:=30.0", "-p", "hop_s:=30.0", "-p", "reliable_inputs:=true"];
+    let (window, hop) = (format!("window_s:={window_s}"), format!("hop_s:={window_s}"));
+    let window = ["-p", &window, "-p", &hop, "-p", "reliable_inputs:=true"];
     let topics = ["-r", "odom:=/car_state/odom", "-r", "imu:=/imu/data", "-r", "wheels:=/wheel_speeds"];
     [
         start("telemetry", &[&window[..], &topics[..]].concat()),
         start(
             "s4_residual",
-            &["-r", "sequence:=telemetry/sequence", "-r", "candidate:=identifier/candidate"],
+            &[
+                "-r",
+                "sequence:=telemetry/sequence",
+                "-r",
+                "candidate:=identifier/candidate",
+                "-r",
+                "odom:=/car_state/odom",
+                "-p",
+                "reliable_inputs:=true",
+            ],
         ),
         start(
             "identifier",
@@ -136,7 +146,7 @@ fn the_live_phi_p_is_the_offline_one_bit_for_bit_at_1x_and_at_10x() {
         let sequences =
             listen(&domain, &python, "/telemetry/sequence", StateSequence::TYPE, "reliable", "1000");
         let tires = listen(&domain, &python, "/identifier/pacejka", PacejkaParams::TYPE, "latched", "1");
-        let _suite = suite(&domain, &vehicle);
+        let _suite = suite(&domain, &vehicle, "30.0");
         tell_prior(&domain, &python);
         let path = format!("bag:={}", bag.display());
         let speed = format!("rate:={rate}");
@@ -159,6 +169,39 @@ fn the_live_phi_p_is_the_offline_one_bit_for_bit_at_1x_and_at_10x() {
     }
 }
 
+#[test]
+fn a_peer_gets_the_residual_of_every_sample_once_there_is_a_model() {
+    let Ok(python) = cyclone() else {
+        available(&[cyclone()]);
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let (bag, vehicle) = simulate(folder.path(), &["--duration", "25", "--seed", "11", "--pace", "0.9"]);
+    let domain = Domain::new();
+    let residuals = listen(&domain, &python, "/s4_residual/residual", Residual::TYPE, "reliable", "200");
+    let _suite = suite(&domain, &vehicle, "9.0");
+    let (path, wait) = (format!("bag:={}", bag.display()), "wait_for:=[/car_state/odom, /drive]");
+    let _player = node(&domain, "bag_player", &["-p", &path, "-p", wait]);
+
+    let mut last: Option<Residual> = None;
+    let mut learned = 0.0_f64;
+    for _ in 0..200 {
+        let now: Residual = serde_json::from_str(&residuals.line(RUN)).unwrap();
+        assert!(now.handshake.sequence_id > 0 && now.handshake.run_id.starts_with("identifier-"));
+        assert!((now.dt_s - 0.02).abs() < 0.005, "{now:?}");
+        assert!(now.yaw_rate_nominal_radps.abs() < 0.5 && now.v_y_nominal_mps.abs() < 0.5, "{now:?}");
+        learned = learned.max((now.yaw_rate_nominal_radps - now.yaw_rate_corrected_radps).abs());
+        if let Some(last) = last.replace(now.clone()) {
+            let ns = |r: &Residual| {
+                i64::from(r.header.stamp.sec) * 1_000_000_000 + i64::from(r.header.stamp.nanosec)
+            };
+            // At the telemetry's 100 Hz, though the model's time step is 0.02 s.
+            assert!((8_000_000..12_000_000).contains(&(ns(&now) - ns(&last))), "{last:?} {now:?}");
+        }
+    }
+    assert!(learned > 1e-5, "the network says nothing");
+}
+
 fn joined(parts: &[StateSequence]) -> gripsight_signals::StateSequence {
     let mut reassembler = Reassembler::default();
     parts.iter().find_map(|p| reassembler.push(p.clone()).unwrap()).unwrap().sequence
@@ -174,7 +217,7 @@ fn a_peer_s_odometry_and_drive_messages_are_identified_from() {
     let (bag, vehicle) = drive(folder.path());
     let domain = Domain::new();
     let tires = listen(&domain, &python, "/identifier/pacejka", PacejkaParams::TYPE, "latched", "1");
-    let _suite = suite(&domain, &vehicle);
+    let _suite = suite(&domain, &vehicle, "30.0");
     tell_prior(&domain, &python);
     // The drive commands first: odometry that comes before its command would have to do without.
     let kinds = [

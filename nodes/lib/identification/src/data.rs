@@ -46,7 +46,7 @@ const PATTERN: [Part; 6] =
 /// Slowest speed that counts, as a share of the median speed; slip angles mean little below.
 const SLOW_SHARE: f64 = 0.25;
 /// Slowest speed that counts in any case.
-const SLOW_MPS: f64 = 0.5;
+pub(crate) const SLOW_MPS: f64 = 0.5;
 /// Half the length of the lines that give the derivative of v_x.
 const SLOPE_HALF_S: f64 = 0.1;
 /// Fewest windows to fit anything to.

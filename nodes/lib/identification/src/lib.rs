@@ -13,6 +13,7 @@ mod error;
 pub mod export;
 mod extract;
 mod judge;
+mod live;
 mod monitor;
 pub mod nelder_mead;
 mod outcome;
@@ -30,6 +31,7 @@ pub use candidate::{
 };
 pub use config::{Config, Method, ResidualKind};
 pub use error::IdentificationError;
+pub use live::{LiveResidual, LiveSample};
 pub use monitor::{Monitor, Reading};
 pub use outcome::{
     Change, HorizonError, IterationRecord, Outcome, PeakFriction, Rmse, RmseReport, SignalEstimates, Source,

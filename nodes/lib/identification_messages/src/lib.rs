@@ -1,8 +1,8 @@
 //! Identification's types as messages and back: candidates, residual models, outcomes. Numbers survive bit for bit.
 
 use gripsight_identification::{
-    Candidate, Estimate, FrictionPrior, INPUTS, IdentificationError, OUTPUTS, Outcome, PeakFriction, Range,
-    ResidualKind, ResidualModel, RunKey, SignalCorrections,
+    Candidate, Estimate, FrictionPrior, INPUTS, IdentificationError, LiveSample, OUTPUTS, Outcome,
+    PeakFriction, Range, ResidualKind, ResidualModel, RunKey, SignalCorrections,
 };
 use gripsight_msgs as msg;
 use gripsight_vehicle::{MagicFormula, PacejkaParameters, VehicleParameters};
@@ -163,6 +163,23 @@ pub fn learned_model(message: &msg::ResidualModel) -> Result<ResidualModel, Iden
         training_loss: message.training_loss,
         validation_loss: message.validation_loss,
     })
+}
+
+/// The live residual of a sample, by the model that answers `key`; its stamp is left to the sender.
+#[must_use]
+pub fn live_residual(live: &LiveSample, key: &RunKey) -> msg::Residual {
+    msg::Residual {
+        header: msg::standard::std_msgs::Header::default(),
+        handshake: handshake(key),
+        dt_s: live.dt_s,
+        v_y_nominal_mps: live.nominal[0],
+        yaw_rate_nominal_radps: live.nominal[1],
+        v_y_corrected_mps: live.corrected[0],
+        yaw_rate_corrected_radps: live.corrected[1],
+        front_slip_rad: live.slip_rad.front,
+        rear_slip_rad: live.slip_rad.rear,
+        extrapolated: live.extrapolated,
+    }
 }
 
 /// The friction of a prior that may be used; `None` where the sender says that it may not.

@@ -1,0 +1,69 @@
+//! The live residual: telemetry as it comes, against the newest model.
+
+use gripsight_bag::encode;
+use gripsight_identification::{LiveResidual, ResidualModel, SignalCorrections};
+use gripsight_identification_messages as messages;
+use gripsight_msgs::Residual;
+use gripsight_msgs::standard::std_msgs::Header;
+use gripsight_runtime::Publisher;
+use gripsight_signals::{AlignConfig, Aligner, Measurement, SignalError};
+use gripsight_vehicle::VehicleParameters;
+
+/// A stamp that goes back further than this means that the clock was set back; less is one late message.
+const CLOCK_JUMP_S: f64 = 1.0;
+
+/// Follows the car with the newest model; says nothing until there is one.
+pub(crate) struct Live {
+    aligner: Aligner,
+    residual: Option<LiveResidual>,
+    output: Publisher<Residual>,
+    /// Residuals published.
+    pub(crate) published: usize,
+}
+
+impl Live {
+    pub(crate) fn new(output: Publisher<Residual>) -> Self {
+        Self { aligner: Aligner::new(AlignConfig::default()), residual: None, output, published: 0 }
+    }
+
+    /// Goes over to another model.
+    pub(crate) fn follow(
+        &mut self,
+        vehicle: &VehicleParameters,
+        model: &ResidualModel,
+        corrections: SignalCorrections,
+    ) {
+        match LiveResidual::new(vehicle, model.clone(), corrections) {
+            Ok(residual) => self.residual = Some(residual),
+            Err(error) => tracing::error!("{}: no live residual: {error}", model.key),
+        }
+    }
+
+    /// Takes a message of the car and publishes what it completes. What is wrong with messages, `telemetry` reports.
+    pub(crate) async fn take(&mut self, measurement: Measurement) {
+        if let Err(SignalError::StampWentBack { back_s, .. }) = self.aligner.push(measurement)
+            && back_s > CLOCK_JUMP_S
+        {
+            self.aligner = Aligner::new(AlignConfig::default());
+            self.residual.iter_mut().for_each(LiveResidual::reset);
+        }
+        while let Some(sample) = self.aligner.poll() {
+            let Some(residual) = &mut self.residual else { continue };
+            match residual.push(&sample) {
+                Ok(None) => {}
+                Ok(Some(live)) => {
+                    let stamp = encode::time(live.stamp_ns);
+                    let header = Header { stamp, frame_id: String::new() };
+                    let message =
+                        Residual { header, ..messages::live_residual(&live, &residual.model().key) };
+                    self.output.publish(&message).await;
+                    self.published += 1;
+                }
+                Err(error) => {
+                    tracing::error!("{}: no live residual any more: {error}", residual.model().key);
+                    self.residual = None;
+                }
+            }
+        }
+    }
+}
