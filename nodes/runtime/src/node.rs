@@ -33,6 +33,17 @@ use crate::value::{ParameterType, ParameterValue};
 /// Time that the node's own tasks have to end.
 const SHUTDOWN_TIME: Duration = Duration::from_secs(2);
 
+/// DDS is looked after this often.
+const WATCH_PERIOD: Duration = Duration::from_secs(1);
+
+/// Why a node no longer runs.
+pub(crate) enum Ended<E> {
+    /// Its work is done, or was asked to end.
+    Work(Result<(), E>),
+    /// DDS has stopped beneath it: it hears and says nothing more.
+    Deaf,
+}
+
 /// A running node.
 pub struct Node {
     identity: Identity,
@@ -171,15 +182,16 @@ impl Node {
         Ok(Subscription { topic, messages })
     }
 
-    /// Runs `work` until it ends or `end` resolves, then stops the node's own tasks in order.
+    /// Runs `work` until it ends, `end` resolves or DDS has stopped, then stops the node's own tasks in order.
     pub(crate) async fn run<E>(
         self,
         work: impl Future<Output = Result<(), E>>,
         end: impl Future<Output = ()>,
-    ) -> Result<(), E> {
+    ) -> Ended<E> {
         let result = tokio::select! {
-            result = work => result,
-            () = end => Ok(()),
+            result = work => Ended::Work(result),
+            () = end => Ended::Work(Ok(())),
+            () = stopped(self.context.domain_participant()) => Ended::Deaf,
         };
         self.close().await;
         result
@@ -265,6 +277,15 @@ impl Node {
             }
         });
         Ok(())
+    }
+}
+
+/// Resolves once DDS no longer runs. RustDDS 0.15.1 ends its threads where a system call is interrupted, which happens to a process
+/// that was stopped and goes on: after Ctrl-Z and `fg`, beneath a debugger. Only a command that nobody takes any more shows it.
+async fn stopped(participant: rustdds::DomainParticipant) {
+    let mut looks = tokio::time::interval(WATCH_PERIOD);
+    while participant.assert_liveliness().is_ok() {
+        looks.tick().await;
     }
 }
 

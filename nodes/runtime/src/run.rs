@@ -2,10 +2,13 @@
 
 use std::future::Future;
 use std::io::Write as _;
+use std::os::unix::process::CommandExt as _;
+use std::process::Command;
 use std::time::Duration;
 
 use tokio::signal::unix::{SignalKind, signal};
 
+use crate::node::Ended;
 use crate::{Error, Node};
 
 /// Time that computations still running have to end when the node is done.
@@ -23,7 +26,8 @@ Example: take another odometry topic, in the namespace /car
 
 /// Runs the node that the program calls `name`: `setup` declares its parameters and topics and
 /// gives its work. The process ends when the work does, or on SIGINT or SIGTERM; the work is then
-/// dropped at its next `await`. With `--help` it prints `manual`, the text of the node's README,
+/// dropped at its next `await`. Where DDS has stopped, as it does when a suspended process goes on, the process starts anew in its place, with
+/// the same arguments; what it held is gone. With `--help` it prints `manual`, the text of the node's README,
 /// and ends.
 ///
 /// # Errors
@@ -39,14 +43,30 @@ where
         return Ok(std::io::stdout().write_all(text.as_bytes()).map_err(Error::Process)?);
     }
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(Error::Process)?;
-    let result = runtime.block_on(async {
+    let ended = runtime.block_on(async {
         let mut node = Node::start(name, std::env::args())?;
         let end = signalled().map_err(Error::Process)?;
         let work = setup(&mut node)?;
-        node.run(work, end).await
+        Ok::<_, E>(node.run(work, end).await)
     });
+    if let Ok(Ended::Deaf) = &ended {
+        tracing::error!("DDS has stopped, as it does when a suspended process goes on: starting anew");
+    }
     runtime.shutdown_timeout(COMPUTATION_TIME);
-    result
+    match ended? {
+        Ended::Work(result) => result,
+        Ended::Deaf => Err(start_anew().into()),
+    }
+}
+
+/// Replaces this process by a new start of the same program; what it gives is why that failed.
+fn start_anew() -> Error {
+    let mut arguments = std::env::args_os();
+    let called = arguments.next().unwrap_or_default();
+    match std::env::current_exe() {
+        Ok(program) => Error::Process(Command::new(program).arg0(called).args(arguments).exec()),
+        Err(error) => Error::Process(error),
+    }
 }
 
 /// Whether `-h` or `--help` stands before the arguments that ROS 2 owns; `arguments` begins with the program's name.

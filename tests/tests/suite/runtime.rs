@@ -14,6 +14,7 @@ use gripsight_tests::samples;
 use serde_json::{Value, json};
 
 const PACEJKA: &str = "gripsight_msgs/msg/PacejkaParams";
+const SEQUENCE: &str = "gripsight_msgs/msg/StateSequence";
 
 /// The node under test, once it is up.
 fn source(domain: &Domain, ros_args: &[&str]) -> Process {
@@ -281,6 +282,27 @@ fn signals_end_the_node_cleanly() {
         node.signal(signal);
         assert!(node.wait(Duration::from_secs(10)).success(), "SIG{signal}");
     }
+}
+
+#[test]
+fn a_node_that_was_stopped_and_goes_on_is_heard_again() {
+    let Ok(python) = cyclone() else {
+        available(&[cyclone()]);
+        return;
+    };
+    let domain = Domain::new();
+    let node = source(&domain, &[]);
+    let hear = || {
+        let listener = start_cyclone(&domain, &python, &["subscribe", "/result_source/sequence", SEQUENCE]);
+        assert!(!message::<StateSequence>(&listener).time_s.is_empty());
+    };
+    hear();
+    node.signal("STOP");
+    std::thread::sleep(Duration::from_millis(500));
+    node.signal("CONT");
+    node.wait_for_log("starting anew", PATIENCE);
+    node.wait_for_log("publishes as /result_source", PATIENCE);
+    hear();
 }
 
 #[test]
