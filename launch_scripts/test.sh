@@ -26,6 +26,9 @@ else
 fi
 cargo test --workspace --locked --doc --quiet
 
+step "road renderer"
+.venv/bin/python -m pytest -q -p no:cacheprovider nodes/camera_prior/training/test_render.py
+
 step "documentation"
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked --quiet
 
