@@ -42,6 +42,43 @@ pub(crate) struct Models<'m> {
     pub(crate) last: &'m Round,
 }
 
+/// What models are scored on: the held-out blocks, or another bag.
+#[derive(Debug, Clone)]
+pub(crate) struct Scorer<'a> {
+    engine: Engine<'a>,
+    windows: Windows,
+    scored_on: &'static str,
+}
+
+impl<'a> Scorer<'a> {
+    pub(crate) fn new(engine: &Engine<'a>, other: Option<&'a Recording>, windows: &Split) -> Self {
+        match other {
+            // The other bag has its own noise; models and weights are those fitted here.
+            Some(recording) => Self {
+                engine: Engine { recording, ..engine.clone() },
+                windows: of_length(recording, &split(recording, false).training, HORIZON_S),
+                scored_on: "another bag",
+            },
+            None if windows.held_out.windows.is_empty() => Self {
+                engine: engine.clone(),
+                windows: of_length(engine.recording, &windows.training, HORIZON_S),
+                scored_on: "training blocks (too little data to hold any out)",
+            },
+            None => Self {
+                engine: engine.clone(),
+                windows: windows.held_out.clone(),
+                scored_on: "held-out blocks",
+            },
+        }
+    }
+
+    /// Mean squared error of a state over the noise.
+    pub(crate) fn error(&self, state: &State) -> f64 {
+        let score = self.engine.score(&state.effects, None, &state.parameters, &self.windows);
+        mean(&by_block(self.engine.recording, &self.windows, &score))
+    }
+}
+
 /// Iterations of the fits of the steps between.
 const STEP_ITERATIONS: usize = 10;
 /// How many of the effects that were not taken are scored, and the iterations of their fits.
@@ -51,27 +88,12 @@ const CANDIDATE_ITERATIONS: usize = 5;
 const WIDEST_SHARE: f64 = 2.0;
 
 impl Budget {
-    /// Scores the models on the held-out blocks, or on another bag.
-    pub(crate) fn of(
-        engine: &Engine<'_>,
-        other: Option<&Recording>,
-        windows: &Split,
-        models: &Models<'_>,
-    ) -> Self {
+    /// Scores the models.
+    pub(crate) fn of(engine: &Engine<'_>, scorer: &Scorer<'_>, windows: &Split, models: &Models<'_>) -> Self {
         let Models { nominal, null, state, last } = *models;
-        // The other bag has its own noise; models and weights are those fitted here.
-        let foreign = other.map(|r| (Engine { recording: r, ..engine.clone() }, split(r, false)));
-        let (scorer, on, scored_on): (&Engine<'_>, Windows, _) = match &foreign {
-            Some((e, s)) => (e, of_length(e.recording, &s.training, HORIZON_S), "another bag"),
-            None if windows.held_out.windows.is_empty() => (
-                engine,
-                of_length(engine.recording, &windows.training, HORIZON_S),
-                "training blocks (too little data to hold any out)",
-            ),
-            None => (engine, windows.held_out.clone(), "held-out blocks"),
-        };
+        let Scorer { engine: scorer, windows: on, scored_on } = scorer;
         let blocks = |effects: &[EffectId], flexible: Option<&Flexible>, p: &[f64]| {
-            by_block(scorer.recording, &on, &scorer.score(effects, flexible, p, &on))
+            by_block(scorer.recording, on, &scorer.score(effects, flexible, p, on))
         };
         let retuned = blocks(&null.effects, None, &null.parameters);
         let mut steps = vec![retuned.clone()];
@@ -99,7 +121,7 @@ impl Budget {
         let ceiling = engine.fit_flexible(state, &flexible, &windows.training);
         let residual = Residual::learned(engine, null, &windows.training).map(|residual| {
             let model = ExtendedModel { residual: Some(&residual), ..scorer.model(&null.effects, None) };
-            by_block(scorer.recording, &on, &scorer.score_model(&model, &null.parameters, &on))
+            by_block(scorer.recording, on, &scorer.score_model(&model, &null.parameters, on))
         });
         let whole = match steps.last() {
             Some(last) if steps.len() > 1 => closed(&retuned, last, &retuned),

@@ -3,7 +3,7 @@
 use gripsight_signals::{DataHealth, StateSequence};
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 
-use crate::budget::{Budget, Models, large_slip_rad};
+use crate::budget::{Budget, Models, Scorer, large_slip_rad};
 use crate::effects::{EffectId, Need};
 use crate::engine::{Engine, State};
 use crate::outcome::{DetectionLimit, Diagnosis, Invisible, TirePair, Unexplained};
@@ -15,7 +15,7 @@ use crate::trust::TireTrust;
 use crate::usable::{Usable, cannot_tell, refused, usable};
 use crate::verdict::{Remains, claims, decide, looks, rank};
 use crate::windows::{Windows, split};
-use crate::{ExtendedModelFile, GapError, Verdict, noise, pictures, place};
+use crate::{ExtendedModelFile, GapError, noise, pictures, place};
 
 /// What is diagnosed, and with what.
 #[derive(Debug, Clone)]
@@ -127,17 +127,20 @@ fn explain(
     };
     progress("looking at what is left, room by room");
     let slip_rad = large_slip_rad(&engine, &null, &windows.training);
-    let left = |state: &State| Left::by(&engine, state, &windows.training, slip_rad);
-    let (before, after) = (left(&null), left(&state));
+    let before = Left::by(&engine, &null, &windows.training, slip_rad);
+    let after = Left::where_calm(&engine, &state, &windows.training, slip_rad);
     let explained = explained(&engine, &state, &windows.training);
     let noise_is_known = noise::is_known(&recording);
-    let remains = Remains { before: &before, after: &after, explained: &explained, noise_is_known };
+    let scorer = Scorer::new(&engine, other.as_ref(), &windows);
+    let held_out = [scorer.error(&null), scorer.error(&state)];
+    let remains = Remains { before: &before, after: &after, explained: &explained, held_out, noise_is_known };
     let blocks = &windows.training.block;
-    let mut claims =
-        claims(&engine, &evidence, &state, &remains, blocks, costs.last().copied().unwrap_or(f64::NAN));
-    // What is no more than a candidate beside named effects is left out of the model.
+    let claims = claims(&engine, &evidence, &state, &remains, blocks);
+    // What is no more than a candidate is left out of the model.
     let named: Vec<EffectId> = claims.iter().filter(|c| c.named).map(|c| c.effect).collect();
-    let model = if named.is_empty() || named.len() == state.named.len() {
+    let model = if named.is_empty() {
+        null.clone()
+    } else if named.len() == state.named.len() {
         state.clone()
     } else {
         let values = engine.carry(&state, &named);
@@ -145,10 +148,10 @@ fn explain(
     };
     progress("scoring on held-out data");
     let models = Models { nominal: &nominal, null: &null, state: &model, last: &last };
-    let budget = Budget::of(&engine, other.as_ref(), &windows, &models);
-    let (verdict, mut reasons) = decide(&budget, &mut claims, &remains, &costs);
+    let budget = Budget::of(&engine, &scorer, &windows, &models);
+    let (verdict, mut reasons) = decide(&budget, &claims, &remains, &costs);
     reasons.extend(noise::caveat(&recording));
-    let effects = rank(&claims, &last, &budget);
+    let effects = rank(&claims, [&model, &state], blocks, &last, &budget);
     let scored_windows =
         if windows.held_out.windows.is_empty() { &windows.training } else { &windows.held_out };
     let on_all = split(&recording, false).training;
@@ -158,11 +161,13 @@ fn explain(
         .candidates
         .iter()
         .flat_map(|c| {
-            c.effect.spec().parameters.iter().zip(&c.error).map(|(p, e)| DetectionLimit {
-                name: c.effect.name(),
-                parameter: p.name,
-                size: 5.0 * e,
-            })
+            c.effect
+                .spec()
+                .parameters
+                .iter()
+                .take(c.effect.sizing())
+                .zip(&c.error)
+                .map(|(p, e)| DetectionLimit { name: c.effect.name(), parameter: p.name, size: 5.0 * e })
         })
         .filter(|l| l.size.is_finite())
         .collect();
@@ -178,15 +183,14 @@ fn explain(
         gap: budget.stated(&recording),
         gap_closed_fraction: budget.closed,
         tires: TirePair { without_effect: null.tires(), with_effect: model.tires() },
-        extended_model: ExtendedModelFile::of(
-            &engine,
-            if verdict == Verdict::Effects { &model } else { &null },
-        ),
+        extended_model: ExtendedModelFile::of(&engine, &model),
         data_health,
         looks: looks(&engine, &evidence, &last, &state),
         search_costs: costs,
         unexplained: Unexplained {
             cost: [before.cost, after.cost],
+            explained: state.named.iter().map(|e| e.name()).zip(explained.iter().copied()).collect(),
+            held_out,
             rooms: before.gains.iter().zip(&after.gains).map(|(b, a)| (b.0.name(), [b.1, a.1])).collect(),
         },
         series: pictures::series(&engine, &nominal, &null, &model, &on_all, &nominal_score, scored_windows),

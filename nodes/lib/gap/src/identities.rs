@@ -115,7 +115,7 @@ fn test(
     let offset = ml - slope * mr;
     let left_over = median(pairs.iter().map(|p| (p.0 - slope * p.1 - offset).abs()).collect()) / 0.674_5;
     let noise = (median(rough) / 0.674_5).max(1e-9);
-    let quiet = crate::noise::of(segments.iter().map(|s| s.a_y_mps2.as_slice())) < QUIET_MPS2;
+    let quiet = crate::noise::of(segments.iter().map(|s| s.a_y_mps2.as_slice()), 4) < QUIET_MPS2;
     let alike = correlation(&fast) > DERIVED_CORRELATION || (name == LATERAL && quiet);
     let derived = alike && left_over < noise;
     let finding = if derived {

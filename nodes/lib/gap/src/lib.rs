@@ -12,8 +12,9 @@
 //!    that is left is put up against all others once more, with the rest of the model in place ([`Look`]).
 //! 4. What the retuned tires and the effects leave is looked at room by room ([`Unexplained`]): steering, sensors, lateral and longitudinal
 //!    forces, road and wind each have free terms (impulse responses, curves, places) that can do roughly what any cause there does. An effect
-//!    that is the cause leaves them nothing; a stand-in does, and its confidence falls. Below even odds an effect is a candidate, not a
-//!    name. Where nothing is named, what the rooms explain tells "none of these" from a retune.
+//!    that is the cause leaves them nothing; a stand-in does. How much they explain over what the effect explains, what is left
+//!    on held-out data, its size and its twins give its confidence by a logistic regression; below even odds an effect is a candidate, not a name. Where nothing is named,
+//!    what the rooms explain tells "none of these" from a retune.
 //! 5. Open-loop rollouts of 1 s on held-out blocks (or another bag): nominal, retuned, with the effects, with all free terms on top (the
 //!    ceiling), with the residual network of `gripsight_s4` in place of effects, against the noise. Effects that reach too little of the ceiling
 //!    are not named.

@@ -7,19 +7,32 @@
 use crate::recording::{Recording, Run};
 use crate::smooth::median;
 
-/// Order of the difference.
-const ORDER: usize = 4;
-/// Binomial(2 ORDER, ORDER).
-const GAIN: f64 = 70.0;
+/// Order of the differences: of all samples, and of every second one.
+const ORDERS: [u32; 2] = [4, 6];
 /// Median of the absolute value of a normal variable over its standard deviation.
 const MEDIAN_OF_NORMAL: f64 = 0.674_49;
 /// Noise is never taken below this share of the signal's standard deviation: rounding and derived signals.
 const LEAST_SHARE: f64 = 2e-3;
 
 /// Standard deviation of the noise of channel `c`.
+///
+/// Signals that were put on a common time base lie between their samples: neighbours share noise, and differences of neighbours hide it. Every
+/// second value does not share it; its figure counts where it is larger, but not so much that motion must be in it.
 pub(crate) fn sigma(runs: &[Run], c: usize) -> f64 {
-    let noise = of(runs.iter().map(|r| r.measured[c].as_slice()));
+    let all = of_all(runs, c);
+    let halved = of(halves(runs, c).iter().map(Vec::as_slice), ORDERS[1]);
+    let noise = if halved < ROUGH_RATIO * all { all.max(halved) } else { all };
     noise.max(LEAST_SHARE * spread(runs, c, true)).max(1e-6)
+}
+
+fn of_all(runs: &[Run], c: usize) -> f64 {
+    of(runs.iter().map(|r| r.measured[c].as_slice()), ORDERS[0])
+}
+
+/// Every second value, from the first and from the second on.
+fn halves(runs: &[Run], c: usize) -> Vec<Vec<f64>> {
+    let from = |run: &Run, first: usize| run.measured[c].iter().skip(first).step_by(2).copied().collect();
+    runs.iter().flat_map(|r| [from(r, 0), from(r, 1)]).collect()
 }
 
 /// A noise that seems so many times larger at half the rate is not white: filtered, simulated, or not to be told from the motion.
@@ -29,10 +42,9 @@ const ROUGH_RATIO: f64 = 2.5;
 
 /// Whether the noise of channel `c` can be told: above the least share, and the same at half the rate, within a ratio.
 fn is_clear(runs: &[Run], c: usize, ratio: f64) -> bool {
-    let noise = of(runs.iter().map(|r| r.measured[c].as_slice()));
-    let halved: Vec<Vec<f64>> =
-        runs.iter().map(|r| r.measured[c].iter().step_by(2).copied().collect()).collect();
-    noise > LEAST_SHARE * spread(runs, c, true) && of(halved.iter().map(Vec::as_slice)) < ratio * noise
+    let noise = of_all(runs, c);
+    let halved = of(halves(runs, c).iter().map(Vec::as_slice), ORDERS[0]);
+    noise > LEAST_SHARE * spread(runs, c, true) && halved < ratio * noise
 }
 
 /// The scored channels whose noise cannot be told within a ratio.
@@ -57,17 +69,19 @@ pub(crate) fn caveat(recording: &Recording) -> Option<String> {
     })
 }
 
-/// Standard deviation of the noise of a series in stretches.
-pub(crate) fn of<'a>(stretches: impl Iterator<Item = &'a [f64]>) -> f64 {
+/// Standard deviation of the noise of a series in stretches, from its differences of an order p: the variance of white noise grows
+/// by the binomial C(2p, p).
+pub(crate) fn of<'a>(stretches: impl Iterator<Item = &'a [f64]>, order: u32) -> f64 {
     let mut sizes = Vec::new();
     for stretch in stretches {
         let mut d = stretch.to_vec();
-        for _ in 0..ORDER {
+        for _ in 0..order {
             d = d.windows(2).map(|w| w[1] - w[0]).collect();
         }
         sizes.extend(d.iter().map(|v| v.abs()));
     }
-    median(sizes) / MEDIAN_OF_NORMAL / GAIN.sqrt()
+    let gain: f64 = (1..=order).map(|k| f64::from(order + k) / f64::from(k)).product();
+    median(sizes) / MEDIAN_OF_NORMAL / gain.sqrt()
 }
 
 /// Time over which a channel that counts without its mean is looked at.
@@ -145,6 +159,11 @@ mod tests {
         let rough = [run(noise.iter().enumerate().map(|(k, n)| motion(k) + 0.02 * n).collect())];
         approx::assert_relative_eq!(sigma(&rough, 0), 0.02, max_relative = 0.05);
         assert!(is_clear(&rough, 0, WHITE_RATIO));
+        // Stamps that jitter, put on an even grid: neighbours share noise, and what is left of it is measured.
+        let between = |k: usize| noise[k] + (k % 7) as f64 / 10.0 * (noise[k + 1] - noise[k]);
+        let even: Vec<f64> = (0..5999).map(|k| motion(k) + 0.02 * between(k)).collect();
+        let left = spread(&[run((0..5999).map(|k| 0.02 * between(k)).collect())], 0, false);
+        approx::assert_relative_eq!(sigma(&[run(even)], 0), left, max_relative = 0.12);
         let mean = |w: &[f64]| w.iter().sum::<f64>() / w.len() as f64;
         let filtered = [run(noise.windows(2).enumerate().map(|(k, w)| motion(k) + 0.02 * mean(w)).collect())];
         assert!(!is_clear(&filtered, 0, WHITE_RATIO));

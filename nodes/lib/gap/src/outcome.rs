@@ -233,8 +233,13 @@ pub struct Unexplained {
     /// Weighted cost per residual: 0.75 is noise.
     pub cost: [f64; 2],
     /// By the place in which a cause can sit (steering, sensors, lateral forces, longitudinal forces, road and wind): how much of the cost
-    /// free terms of that place would explain on windows that they were not fitted to.
+    /// free terms of that place would explain on windows that they were not fitted to; beside the effects found, on the 85 % of the windows
+    /// that the model follows best.
     pub rooms: BTreeMap<&'static str, [f64; 2]>,
+    /// Mean squared error of the rollouts on held-out data over the noise variance.
+    pub held_out: [f64; 2],
+    /// By effect found: how much of the weighted cost per residual it explains beside the others.
+    pub explained: BTreeMap<&'static str, f64>,
 }
 
 /// A diagnosis.

@@ -8,6 +8,7 @@ use crate::effects::EffectId;
 use crate::engine::{Engine, FLEXIBLE_RIDGE, State};
 use crate::flexible::{Flexible, Room};
 use crate::search::without;
+use crate::smooth::quantile;
 use crate::windows::Windows;
 
 /// The engine with the channels counted by their noise.
@@ -47,12 +48,22 @@ const LEAST_INFORMATION: f64 = 1e-6;
 /// What free terms of a room explain in drives in which nothing is the matter, as a drop of the cost per residual: five of a hundred reach
 /// more. Fixed on development cases, 2026-11-21.
 fn usual(room: Room) -> f64 {
-    if room == Room::Drive { 0.12 } else { 0.05 }
+    match room {
+        Room::Steering => 0.055,
+        Room::Sensors => 0.045,
+        Room::Forces => 0.065,
+        Room::Drive => 0.12,
+        Room::Outside => 0.02,
+    }
 }
 /// So many times that, and something is the matter.
 const TELLING: f64 = 1.6;
 /// Weighted cost per residual that no drive reaches in which nothing is the matter.
-const TELLING_COST: f64 = 2.1;
+const TELLING_COST: f64 = 1.5;
+/// What the terms of the longitudinal forces explain in any drive: how the wheels are spun up and slip.
+const OF_ANY_DRIVE: f64 = 0.06;
+/// Share of the windows that the model follows best: what a car does beyond its grip, no term of a room follows, and no effect.
+const CALM: f64 = 0.85;
 
 impl Left {
     /// What a state leaves where the channels count by their noise, its own parameters moving along.
@@ -65,9 +76,25 @@ impl Left {
         Self { cost: cost(engine, state, windows), gains: Room::ALL.into_iter().map(gain).collect() }
     }
 
-    /// The most that a room explains beyond what is usual; 0 where none does.
-    pub(crate) fn beyond_usual(&self) -> f64 {
-        self.gains.iter().map(|(room, gain)| gain - usual(*room)).fold(0.0, f64::max)
+    /// The same on the calm part of the windows.
+    pub(crate) fn where_calm(engine: &Engine<'_>, state: &State, windows: &Windows, slip_rad: f64) -> Self {
+        let now =
+            by_noise(engine).fit(&state.named, &state.parameters, Some(state.starts.clone()), windows, 0);
+        let most = quantile(now.window_costs.clone(), CALM);
+        let kept: Vec<usize> = (0..windows.windows.len()).filter(|&k| now.window_costs[k] <= most).collect();
+        let calm = Windows {
+            windows: kept.iter().map(|&k| windows.windows[k]).collect(),
+            block: kept.iter().map(|&k| windows.block[k]).collect(),
+        };
+        let state = State { starts: kept.iter().map(|&k| state.starts[k]).collect(), ..state.clone() };
+        let left = Self::by(engine, &state, &calm, slip_rad);
+        Self { cost: now.cost / now.residuals(), ..left }
+    }
+
+    /// The most that a room explains, but for what it explains in any drive.
+    pub(crate) fn most(&self) -> f64 {
+        let any = |room: Room| if room == Room::Drive { OF_ANY_DRIVE } else { 0.0 };
+        self.gains.iter().map(|(room, gain)| gain - any(*room)).fold(0.0, f64::max)
     }
 
     /// The room that explains most, where that is telling.
@@ -171,4 +198,84 @@ fn predicted(from: &Half, on: &Half, rows: &[usize], hold: &dyn Fn(usize) -> f64
     let Some(step) = information.cholesky().map(|c| c.solve(&-gradient)) else { return 0.0 };
     let (information, gradient) = (pick(&on.information), pick_vector(&on.gradient));
     -(2.0 * gradient.dot(&step) + (&information * &step).dot(&step))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Recording;
+    use crate::trust::TireTrust;
+    use crate::windows::split;
+    use gripsight_signals::StateSequence;
+    use gripsight_vehicle::{Input, PacejkaParameters, SingleTrack, State as Motion, VehicleParameters};
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    const DT_S: f64 = 0.01;
+
+    fn tires() -> PacejkaParameters {
+        PacejkaParameters::from_array([7.0, 1.5, 1.0, 0.1, 8.0, 1.4, 0.95, -0.2])
+    }
+
+    /// The nominal car's drive over wheels that follow the recorded command with a time constant.
+    fn drive(vehicle: &VehicleParameters, lag_s: f64) -> Recording {
+        const SAMPLES: usize = 2400;
+        let car = SingleTrack::new(vehicle, &tires());
+        let random = &mut rand_chacha::ChaCha8Rng::seed_from_u64(9);
+        let mut noise = |size: f64| -> f64 {
+            let normal: f64 = StandardNormal.sample(random);
+            size * normal
+        };
+        let command = |k: usize| {
+            let t_s = k as f64 * DT_S;
+            0.10 * (2.1 * t_s).sin() + 0.05 * (9.0 * t_s).sin() + 0.03 * (17.0 * t_s).sin()
+        };
+        let v_x_mps = |k: usize| 4.0 + (0.7 * k as f64 * DT_S).sin();
+        let mut wheel_rad = vec![0.0];
+        for k in 1..SAMPLES {
+            let follow = if lag_s > 0.0 { 1.0 - (-DT_S / lag_s).exp() } else { 1.0 };
+            let before: f64 = wheel_rad[k - 1];
+            wheel_rad.push(before + follow * (command(k - 1) - before));
+        }
+        let input = |k: usize| Input { v_x_mps: v_x_mps(k), steering_rad: wheel_rad[k] };
+        let mut x = Motion { v_y_mps: 0.0, yaw_rate_radps: 0.0 };
+        let mut sequence = StateSequence::default();
+        for k in 0..SAMPLES {
+            sequence.time_s.push((k as f64 * DT_S) as f32);
+            sequence.v_x_mps.push(v_x_mps(k) as f32);
+            sequence.v_y_mps.push((x.v_y_mps + noise(0.01)) as f32);
+            sequence.yaw_rate_radps.push((x.yaw_rate_radps + noise(0.02)) as f32);
+            sequence.steering_rad.push(command(k) as f32);
+            x = car.step(x, &input(k), &input((k + 1).min(SAMPLES - 1)), DT_S, 0.0025);
+        }
+        Recording::new(&sequence).unwrap()
+    }
+
+    #[test]
+    fn a_room_tells_its_own_cause_until_the_effect_is_there() {
+        const LARGE_SLIP_RAD: f64 = 0.1;
+        let vehicle = VehicleParameters::f1tenth();
+        let left = |lag_s: f64, named: &[EffectId]| {
+            let recording = drive(&vehicle, lag_s);
+            let windows = split(&recording, false).training;
+            let engine = Engine::new(&recording, &vehicle, tires(), TireTrust::file());
+            let null = engine.fit(&[], &engine.blank(), None, &windows, 15);
+            let mut values = engine.carry(&null, named);
+            if let [EffectId::SteeringLag] = named {
+                let tau = values.len() - 2;
+                values[tau] = 0.03;
+            }
+            let state = engine.fit(named, &values, Some(null.starts), &windows, 15);
+            Left::where_calm(&engine, &state, &windows, LARGE_SLIP_RAD)
+        };
+        let well = left(0.0, &[]);
+        assert!(!well.tells(), "{well:?}");
+        let late = left(0.06, &[]);
+        assert!(late.tells() && late.telling().is_some_and(|(room, _)| room == Room::Steering), "{late:?}");
+        let named = left(0.06, &[EffectId::SteeringLag]);
+        assert!(!named.tells() && named.most() < 0.02 * late.most(), "{named:?} {late:?}");
+        // A stand-in leaves the room more to explain.
+        let stand_in = left(0.06, &[EffectId::TireRelaxation]);
+        assert!(stand_in.most() > 5.0 * named.most().max(0.01), "{stand_in:?}");
+    }
 }

@@ -18,11 +18,10 @@ pub(crate) struct Found {
     pub(crate) costs: Vec<f64>,
 }
 
-/// A delay that is not enough, so that a lag is needed beside it, is a lag of higher order: a servo, a filter. It goes by the lag's name.
-const DELAY_AND_LAG: [[EffectId; 2]; 2] =
-    [[EffectId::SteeringDelay, EffectId::SteeringLag], [EffectId::OdometryDelay, EffectId::OdometryLowPass]];
+/// A delay that is not enough, so that a lag is needed beside it, is a filter of higher order. It goes by the lag's name.
+const DELAY_AND_LAG: [EffectId; 2] = [EffectId::OdometryDelay, EffectId::OdometryLowPass];
 /// Rounds at most.
-const ROUNDS: usize = 6;
+const ROUNDS: usize = 8;
 /// Iterations of the fit after a change of the weights.
 const SETTLE: usize = 8;
 
@@ -49,14 +48,13 @@ pub(crate) fn search(
         };
         evidence.push(here);
         state = settled(engine, &next, windows);
-        for [delay, lag] in DELAY_AND_LAG {
-            let place = |e: EffectId| state.named.iter().position(|n| *n == e);
-            if let (Some(from), Some(to)) = (place(delay), place(lag)) {
-                // What was compared when the first of the two was found says how sure the pair is.
-                evidence.remove(from.max(to));
-                state = without(engine, &state, delay, windows);
-                library.retain(|e| *e != delay);
-            }
+        let [delay, lag] = DELAY_AND_LAG;
+        let place = |e: EffectId| state.named.iter().position(|n| *n == e);
+        if let (Some(from), Some(to)) = (place(delay), place(lag)) {
+            // What was compared when the first of the two was found says how sure the pair is.
+            evidence.remove(from.max(to));
+            state = without(engine, &state, delay, windows);
+            library.retain(|e| *e != delay);
         }
         drop_needless(engine, &mut state, &mut evidence, windows);
         costs.push(state.cost / state.residuals());

@@ -19,7 +19,7 @@ pub(crate) mod thresholds {
     pub(crate) const WORTH_OF_BEST: f64 = 0.06;
     pub(crate) const WORTH_OF_COST: f64 = 0.01;
     /// Effects taken at most.
-    pub(crate) const MOST_EFFECTS: usize = 3;
+    pub(crate) const MOST_EFFECTS: usize = 5;
     /// Weighted cost per residual that noise alone leaves.
     pub(crate) const NOISE_COST: f64 = 0.75;
     /// Drop of the weighted cost per residual below which an effect does not matter.
@@ -27,7 +27,7 @@ pub(crate) mod thresholds {
     /// Weighted cost per residual up to which there is no gap to explain.
     pub(crate) const SMALL_COST: f64 = 1.3;
     /// Share of the remaining weighted cost that a first and a later effect must close.
-    pub(crate) const LEAST_SHARE: [f64; 2] = [0.08, 0.12];
+    pub(crate) const LEAST_SHARE: [f64; 2] = [0.08, 0.08];
     /// How sure it must be that a candidate beats the current model, in standard deviations over blocks.
     pub(crate) const LEAST_Z: f64 = 2.0;
     /// The same for an effect that sits in one part of the lap: other blocks do not hold it.
@@ -39,7 +39,7 @@ pub(crate) mod thresholds {
     /// The same for an effect that sits in one part of the lap.
     pub(crate) const LEAST_PLACE_SIZE: f64 = 0.2;
     /// The same for an effect that every car has a little of, over what is usual.
-    pub(crate) const LEAST_OVER_USUAL: f64 = 1.3;
+    pub(crate) const LEAST_OVER_USUAL: f64 = 1.15;
     /// Candidates whose refits cannot be told apart by this many standard deviations are confused.
     pub(crate) const CONFUSED_Z: f64 = 1.64;
     /// Candidates whose signatures are this parallel are confused.
@@ -330,14 +330,14 @@ fn score(r: &Refit) -> f64 {
     if r.relative_size >= thresholds::MOST_SIZE {
         return 0.0;
     }
-    r.gain - PRICE * r.effect.spec().parameters.len() as f64
+    r.gain - PRICE * r.effect.sizing() as f64
 }
 
 /// Of near equals the one with fewer parameters wins.
 fn prefer_simple(refits: &mut [Refit]) {
     let Some(best) = refits.first().map(score) else { return };
     let near = |r: &Refit| score(r) > best - thresholds::NEAR_SHARE * 0.4 * best.max(0.0);
-    let count = |r: &Refit| r.effect.spec().parameters.len();
+    let count = |r: &Refit| r.effect.sizing();
     if let Some(place) = (1..refits.len())
         .filter(|&i| near(&refits[i]) && count(&refits[i]) < count(&refits[0]))
         .min_by_key(|&i| (count(&refits[i]), i))

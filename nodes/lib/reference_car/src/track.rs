@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 use crate::error::ReferenceCarError;
 
 /// Names of the closed tracks.
-pub const TRACK_NAMES: [&str; 7] = ["oval", "club", "esses", "bean", "clover", "harbor", "valley"];
+pub const TRACK_NAMES: [&str; 9] =
+    ["oval", "club", "esses", "bean", "clover", "harbor", "valley", "quarry", "delta"];
 
 /// A closed centre line, sampled evenly by arc length.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,6 +59,8 @@ fn shape(name: &str) -> Option<Shape> {
         "clover" => Shape { size_m: 220.0, cosines: &[(3, 0.24), (2, 0.1)], sines: &[(5, 0.04)] },
         "harbor" => Shape { size_m: 205.0, cosines: &[(2, 0.2), (4, 0.05)], sines: &[(1, 0.15), (3, 0.1)] },
         "valley" => Shape { size_m: 225.0, cosines: &[(1, 0.2), (3, 0.12)], sines: &[(2, 0.18), (5, 0.02)] },
+        "quarry" => Shape { size_m: 215.0, cosines: &[(2, 0.12), (3, 0.14)], sines: &[(1, 0.18), (4, 0.04)] },
+        "delta" => Shape { size_m: 200.0, cosines: &[(1, 0.12), (5, 0.03)], sines: &[(2, 0.2), (3, 0.12)] },
         _ => return None,
     };
     Some(shape)

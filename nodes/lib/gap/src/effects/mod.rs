@@ -249,9 +249,12 @@ impl EffectId {
         matches!(self, Self::LowGripPatch | Self::RoadBank | Self::RoadSlope)
     }
 
-    /// How many of its parameters, the first ones, size it; later ones only place it.
+    /// How many of its parameters, the first ones, size it; later ones place or shape it.
     pub(crate) fn sizing(self) -> usize {
-        if self == Self::LowGripPatch { 1 } else { self.spec().parameters.len() }
+        match self {
+            Self::LowGripPatch | Self::SteeringLag => 1,
+            _ => self.spec().parameters.len(),
+        }
     }
 
     /// Canonical name.

@@ -3,32 +3,84 @@
 use gripsight_vehicle::Real;
 
 use super::{Effect, EffectSpec, ParameterSpec, Reported, both_sides, positive, spec};
-use crate::terms::{delayed, lagged};
+use crate::terms::delayed;
 
-/// The wheels follow the command with a first-order lag.
+/// The wheels follow the command through a servo: a lag of second order.
 #[derive(Debug)]
 pub(super) struct SteeringLag;
+
+/// Share of a step between samples below which a lag is taken as a shift.
+const SHORT_LAG: f64 = 1.0 / 30.0;
 
 impl Effect for SteeringLag {
     const SPEC: EffectSpec = EffectSpec {
         starts: &[0.5, 0.15],
         ..spec(
             "steering_lag",
-            "tau d' + d = u",
-            "a servo, to first order",
+            "q tau^2 d'' + tau d' + d = u",
+            "a servo: damping 1/(2 sqrt q), from heavily damped (0.05: as good as first order) to 0.7 (0.5)",
             "steering up to 3 Hz",
-            &[positive("tau_s", "s", [0.06, 0.06])],
+            &[
+                positive("tau_s", "s", [0.06, 0.06]),
+                ParameterSpec { name: "q", unit: "1", null: 0.25, size: [0.1, 0.1], range: [-2.0, 2.5] },
+            ],
         )
     };
 
     fn steer<T: Real>(p: &[T], steering_rad: &mut [T], dt_s: f64) {
         let Some(&first) = steering_rad.first() else { return };
-        let (mut before, mut y) = (first, first);
+        let (tau_s, q) = (p[0], p[1]);
+        let short = tau_s.re() < dt_s * SHORT_LAG;
+        let decay = if short { Decay::at_once() } else { Decay::of(tau_s, q, dt_s) };
+        // The wheels settle to u - tau u' where the command goes on straight: what they are off by, and its rate.
+        let (mut before, mut off, mut rate) = (first, T::from(0.0), T::from(0.0));
+        let mut slope = T::from(0.0);
         for u in steering_rad.iter_mut() {
-            y = lagged(y, before, *u, dt_s, p[0]);
-            before = *u;
-            *u = y;
+            let now = (*u - before) / dt_s;
+            let turned = now - slope;
+            (off, rate) = decay.after(off + turned * tau_s, rate - turned);
+            (before, slope) = (*u, now);
+            *u += off - now * tau_s;
         }
+    }
+}
+
+/// How q tau^2 e'' + tau e' + e = 0 goes on over a step: e(h) and e'(h) as shares of e(0) and e'(0).
+struct Decay<T> {
+    shares: [[T; 2]; 2],
+}
+
+impl<T: Real> Decay<T> {
+    fn at_once() -> Self {
+        Self { shares: [[T::from(0.0); 2]; 2] }
+    }
+
+    fn of(tau_s: T, q: T, h_s: f64) -> Self {
+        let half = (q * tau_s * 2.0).recip();
+        let square = (q * tau_s * tau_s).recip();
+        // cosh and sinh(x)/x of the root of (half^2 - square) h^2, which may be negative, times exp(-half h).
+        let argument = (half * half - square) * (h_s * h_s);
+        let damped = (-half * h_s).exp();
+        let (even, odd) = if argument.re().abs() < 1e-3 {
+            (
+                argument / 2.0 + 1.0 + argument * argument / 24.0,
+                argument / 6.0 + 1.0 + argument * argument / 120.0,
+            )
+        } else if argument.re() > 0.0 {
+            let root = argument.sqrt();
+            let (up, down) = (root.exp(), (-root).exp());
+            ((up + down) * 0.5, (up - down) * 0.5 / root)
+        } else {
+            let root = (-argument).sqrt();
+            (root.cos(), root.sin() / root)
+        };
+        let (even, odd) = (even * damped, odd * damped * h_s);
+        Self { shares: [[even + odd * half, odd], [-odd * square, even - odd * half]] }
+    }
+
+    fn after(&self, off: T, rate: T) -> (T, T) {
+        let [a, b] = &self.shares;
+        (a[0] * off + a[1] * rate, b[0] * off + b[1] * rate)
     }
 }
 
@@ -171,6 +223,38 @@ impl Effect for SteeringRateLimit {
                 *u
             };
             *u = wheel;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lag_is_the_second_order_equation_at_any_damping() {
+        const DT_S: f64 = 0.01;
+        let command: Vec<f64> = (0..60).map(|k| (k as f64 * 0.3).sin() * 0.1).collect();
+        for (tau_s, q) in [(0.06, 0.05), (0.06, 0.25), (0.03, 0.4), (0.1, 0.5), (0.002, 0.25)] {
+            // Fine steps of q tau^2 d'' + tau d' + d = u, the command straight between samples.
+            const FINE: usize = 4000;
+            let (mut d, mut rate) = (command[0], 0.0);
+            let mut expected = vec![d];
+            for k in 1..command.len() {
+                for i in 0..FINE {
+                    let share = (i as f64 + 0.5) / FINE as f64;
+                    let u = command[k - 1] + (command[k] - command[k - 1]) * share;
+                    let h_s = DT_S / FINE as f64;
+                    rate += h_s * (u - d - tau_s * rate) / (q * tau_s * tau_s);
+                    d += h_s * rate;
+                }
+                expected.push(d);
+            }
+            let mut followed = command.clone();
+            SteeringLag::steer(&[tau_s, q], &mut followed, DT_S);
+            for (a, b) in followed.iter().zip(&expected) {
+                approx::assert_relative_eq!(a, b, epsilon = 2e-4);
+            }
         }
     }
 }
