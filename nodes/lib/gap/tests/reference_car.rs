@@ -47,6 +47,10 @@ fn without_an_effect_nothing_is_named() {
     let d = diagnosed(&recording, &[]);
     assert!(matches!(d.verdict, Verdict::NoGap | Verdict::TireRetuneOnly), "{}", d.text());
     assert_eq!(named(&d), Vec::<&str>::new());
+    // No figure speaks of a candidate, and none is listed that is not there at all.
+    assert_eq!((d.gap.after, d.tires.with_effect), (d.gap.retuned, d.tires.without_effect));
+    assert_eq!(d.gap_closed_fraction.value, 0.0);
+    assert!(d.effects.iter().all(|e| e.parameters.values().all(|p| p.value.is_finite())), "{}", d.text());
 }
 
 #[test]
