@@ -11,7 +11,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from mcap_ros2.reader import read_ros2_messages
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
 
 PROPOSED = 1
 # The run ends at the first; the turns after which it would have ended at the other.
@@ -48,15 +49,15 @@ def number(path, key):
 def turns_of(recording):
     """Tires by turn (0 is the start), how far each turn moved the curves, the run's end, and the prior that it began with."""
     tires, change, end, prior = {}, {}, None, None
-    for message in read_ros2_messages(recording):
-        m, topic = message.ros_msg, message.channel.topic
-        if topic == "/camera_prior/friction" and not tires and m.valid:
-            prior = (m.mu, m.sigma)
-        if topic == "/identifier/progress" and m.handshake.iteration:
-            change[m.handshake.iteration] = m.change
-        if topic == "/identifier/candidate":
-            tires[m.handshake.iteration] = m
-            end = m if m.status != PROPOSED else end
+    with open(recording, "rb") as file:
+        for _, channel, _, m in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
+            if channel.topic == "/camera_prior/friction" and not tires and m.valid:
+                prior = (m.mu, m.sigma)
+            if channel.topic == "/identifier/progress" and m.handshake.iteration:
+                change[m.handshake.iteration] = m.change
+            if channel.topic == "/identifier/candidate":
+                tires[m.handshake.iteration] = m
+                end = m if m.status != PROPOSED else end
     return [(tires[k], change.get(k)) for k in sorted(tires)], end, prior
 
 
