@@ -25,14 +25,15 @@ PROPOSED = 1
 
 def schema(package, name):
     """The definition with those that it needs, as bags hold it."""
-    texts, waiting, seen = [definition(package, name)], [(package, texts_of) for texts_of in fields(package, name)], set()
+    texts, seen = [definition(package, name)], set()
+    waiting = [(package, kind) for kind in fields(package, name)]
     while waiting:
         owner, kind = waiting.pop(0)
-        package, name = kind.split("/") if "/" in kind else (owner, kind)
-        if (package, name) not in seen:
-            seen.add((package, name))
-            texts.append(f"MSG: {package}/{name}\n{definition(package, name)}")
-            waiting += [(package, inner) for inner in fields(package, name)]
+        inner = tuple(kind.split("/")) if "/" in kind else (owner, kind)
+        if inner not in seen:
+            seen.add(inner)
+            texts.append(f"MSG: {'/'.join(inner)}\n{definition(*inner)}")
+            waiting += [(inner[0], kind) for kind in fields(*inner)]
     return ("\n" + "=" * 80 + "\n").join(texts)
 
 

@@ -11,7 +11,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from mcap_ros2.reader import read_ros2_messages
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
 
 PROPOSED = 1
 # The run ends at the first; the turns after which it would have ended at the other.
@@ -48,15 +49,15 @@ def number(path, key):
 def turns_of(recording):
     """Tires by turn (0 is the start), how far each turn moved the curves, the run's end, and the prior that it began with."""
     tires, change, end, prior = {}, {}, None, None
-    for message in read_ros2_messages(recording):
-        m, topic = message.ros_msg, message.channel.topic
-        if topic == "/camera_prior/friction" and not tires and m.valid:
-            prior = (m.mu, m.sigma)
-        if topic == "/identifier/progress" and m.handshake.iteration:
-            change[m.handshake.iteration] = m.change
-        if topic == "/identifier/candidate":
-            tires[m.handshake.iteration] = m
-            end = m if m.status != PROPOSED else end
+    with open(recording, "rb") as file:
+        for _, channel, _, m in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
+            if channel.topic == "/camera_prior/friction" and not tires and m.valid:
+                prior = (m.mu, m.sigma)
+            if channel.topic == "/identifier/progress" and m.handshake.iteration:
+                change[m.handshake.iteration] = m.change
+            if channel.topic == "/identifier/candidate":
+                tires[m.handshake.iteration] = m
+                end = m if m.status != PROPOSED else end
     return [(tires[k], change.get(k)) for k in sorted(tires)], end, prior
 
 
@@ -98,6 +99,23 @@ def settled(run, tolerance):
     return next((int(row["turn"]) for row in run[1:] if float(row["change"]) < tolerance), None)
 
 
+def close(run, tolerance):
+    """The turn after which no later one is further from the end than this."""
+    return max((int(row["turn"]) + 1 for row in run if float(row["to_the_end"]) > tolerance), default=0)
+
+
+def counted(runs, title, tolerances, turns_of_run):
+    """Mean turns on each road and all, and on how many drives they are fewer, as many and more with the camera."""
+    mus = [*dict.fromkeys(mu for mu, _ in runs), "all"]
+    print(f"\n| {title} | " + " | ".join(f"{mu}, without | with" for mu in mus) + " | fewer, as many, more with |")
+    print("| --- " * (2 * len(mus) + 2) + "|")
+    for tolerance in tolerances:
+        turns = {mu: [[turns_of_run(pair[c], tolerance) for c in ("without", "with")] for (m, _), pair in runs.items() if mu in (m, "all")] for mu in mus}
+        means = [f"{statistics.mean(t[k] for t in turns[mu]):.2f}" for mu in mus for k in (0, 1)]
+        signs = [str(sum((b > a) - (b < a) == sign for a, b in turns["all"])) for sign in (-1, 0, 1)]
+        print(f"| {tolerance:.0%} | {' | '.join(means)} | {', '.join(signs)} |")
+
+
 def table(path, picture=None):
     runs = read(path)
     both = lambda cells: " | ".join(map(str, cells))
@@ -113,18 +131,13 @@ def table(path, picture=None):
         print(f"| {both(cells)} |")
     mus = [*dict.fromkeys(mu for mu, _ in runs), "all"]
     of = lambda mu: [[pair["without"], pair["with"]] for (m, _), pair in runs.items() if mu in (m, "all")]
-    print(f"\n| tolerance | {both(f'mean turns, {mu}, without | with' for mu in mus)} | fewer, as many, more with |")
-    print("| --- " * (2 * len(mus) + 2) + "|")
-    for tolerance in (0.02, 0.03, 0.05, 0.1, 0.15, 0.2, 0.3):
-        # A run that did not settle counts one turn more than it may take.
-        turns = {mu: [[settled(run, tolerance) or TURNS + 1 for run in pair] for pair in of(mu)] for mu in mus}
-        means = [f"{statistics.mean(t[k] for t in turns[mu]):.2f}" for mu in mus for k in (0, 1)]
-        counts = [sum((b > a) - (b < a) == sign for a, b in turns["all"]) for sign in (-1, 0, 1)]
-        print(f"| {tolerance:.0%} | {both(means)} | {', '.join(map(str, counts))} |")
+    # A run that did not settle counts one turn more than it may take.
+    counted(runs, "tolerance", (0.02, 0.03, 0.05, 0.1, 0.15, 0.2, 0.3), lambda run, t: settled(run, t) or TURNS + 1)
+    counted(runs, "stays within", (0.02, 0.03, 0.05, 0.1, 0.15, 0.2, 0.3), close)
     print("\n| after | furthest from the end's curves, median without | with | RMSE of F_y/F_z front / rear, median without | with |")
     print("| --- " * 5 + "|")
     for name, turn in (("the start", 0), ("one turn", 1), ("the last turn", -1)):
-        median = lambda key, k: statistics.median(float(pair[k][turn][key]) for pair in of("all"))
+        median = lambda key, k: statistics.median(float(pair[("without", "with")[k]][turn][key]) for pair in runs.values())
         away = [f"{median('to_the_end', k):.0%}" for k in (0, 1)]
         rmse = [f"{median('rmse_front', k):.3f} / {median('rmse_rear', k):.3f}" for k in (0, 1)]
         print(f"| {name} | {both(away)} | {both(rmse)} |")

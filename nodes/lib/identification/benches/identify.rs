@@ -8,7 +8,10 @@ mod support;
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use gripsight_identification::{Config, Identification, ResidualKind, Started, identify, train_residual};
+use gripsight_identification::{
+    Config, Identification, LiveResidual, ResidualKind, Started, identify, train_residual,
+};
+use gripsight_signals::{DriveSample, OdometrySample, TelemetrySample};
 use support::{drive, scenario, with_background};
 
 fn whole(c: &mut Criterion) {
@@ -34,8 +37,28 @@ fn whole(c: &mut Criterion) {
                 train_residual(black_box(&sequence), &vehicle, candidate, &config, &mut go_on)
             });
         });
+        let mut go_on = |_| std::ops::ControlFlow::Continue(());
+        let model = train_residual(&sequence, &vehicle, candidate, &config, &mut go_on);
+        let live = model.and_then(|model| LiveResidual::new(&vehicle, model, candidate.corrections));
+        if let Ok(mut live) = live {
+            let mut sample = telemetry(0);
+            group.bench_function("live residual, one sample", |b| {
+                b.iter(|| {
+                    sample.odometry.stamp_ns += 10_000_000;
+                    live.push(black_box(&sample))
+                });
+            });
+        }
     }
     group.finish();
+}
+
+/// A car in a steady turn.
+fn telemetry(stamp_ns: i64) -> TelemetrySample {
+    let odometry =
+        OdometrySample { stamp_ns, v_x_mps: 6.0, v_y_mps: -0.05, yaw_rate_radps: 1.0, ..Default::default() };
+    let drive = DriveSample { stamp_ns, steering_angle_rad: 0.08, ..Default::default() };
+    TelemetrySample { odometry, drive, imu: None, wheels: None }
 }
 
 criterion_group!(benches, whole);
