@@ -74,12 +74,7 @@ fn main() -> Result<()> {
                     let (network, prior) = (residual.name(), prior.map_or("none", |_| "0.8"));
                     println!(
                         "{seed},{data},{network},{prior},{:.4},{:.4},{:.4},{:.4},{},{},{seconds:.2},{front:.3},{rear:.3}",
-                        rmse[0],
-                        rmse[1],
-                        floor[0],
-                        floor[1],
-                        outcome.iterations,
-                        outcome.converged
+                        rmse[0], rmse[1], floor[0], floor[1], outcome.iterations, outcome.converged
                     );
                     let with = if prior == "none" { "" } else { ", prior" };
                     let name = format!("{network}, {data} drive{with}");

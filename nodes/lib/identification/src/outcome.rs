@@ -19,7 +19,7 @@ pub struct PeakFriction {
     pub high: f64,
     /// Whether the data reach the peak of the curve.
     pub reached: bool,
-    /// Whether the value is the prior's and not the data's.
+    /// Whether the value is the prior's: a soft bound, within which the data may have moved it.
     pub from_prior: bool,
 }
 

@@ -9,7 +9,7 @@ use crate::{FrictionPrior, PerAxle};
 const ROAD_TO_AXLE: f64 = 0.1;
 
 /// A prior contradicts the data where it raises what the windows and the prior itself miss by more than this. Chosen on the draws 5000-5119: of 112
-/// with the road's own mu 4 are refused for it, and with 0.4 more none is accepted with D off by more than 25 %.
+/// with the road's own mu one is refused for it, and of those with 0.4 more one is accepted with D off by more than 25 %.
 const CONTRADICTION: f64 = 5.0;
 
 /// Standard deviation of an axle's D about a friction prior.
