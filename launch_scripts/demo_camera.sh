@@ -56,7 +56,10 @@ play() {
     : > "$recording.ready"
     "$python" tests/peers/record.py "$recording.mcap" > "$recording.ready" &
     local recorder=$!
-    until grep -q ready "$recording.ready"; do sleep 0.1; done
+    until grep -q ready "$recording.ready"; do
+        kill -0 "$recorder" 2>/dev/null || { echo "demo_camera: the recorder did not start" >&2; exit 1; }
+        sleep 0.1
+    done
     launch_scripts/run_suite.sh --vehicle "$drive.vehicle.yaml" --bag "$drive.mcap" --params "$out/params.yaml" \
         --bin "$bin" --linger 120 "$@" 2> "$recording.log" &
     suite=$!

@@ -14,7 +14,7 @@ OUT/NAME/about.json with the effects that the plant contains by its equations. S
 
 Drive command: for slipx `steering_angle` is the command (the servo's lag is the plant's), for the multibody car the angle
 of the road wheels. `acceleration` is the longitudinal force asked of the tires over the mass.
-Stated in vehicle.yaml: the plant's true mass, inertia and axle distances.
+Stated in vehicle.yaml: the plant's true mass, inertia, axle distances, and the split of drive and brake.
 """
 
 import argparse
@@ -119,7 +119,10 @@ class Slipx:
         for tire in (p.tyre_front, p.tyre_rear):
             ratio = tire.mu_x0 / tire.mu_y0
             tire.mu_y0, tire.mu_x0 = mu, mu * ratio
-        self.vehicle = dict(mass_kg=p.mass, yaw_inertia_kgm2=p.izz, l_f_m=p.lf, l_r_m=p.lr, h_cg_m=p.h_cog)
+        self.vehicle = dict(
+            mass_kg=p.mass, yaw_inertia_kgm2=p.izz, l_f_m=p.lf, l_r_m=p.lr, h_cg_m=p.h_cog,
+            drive_front_share=0.0, brake_front_share=0.0,
+        )
         self.wheelbase_m, self.top_mps = p.lf + p.lr, 12.0
         self.model = slipx.VehicleModel.create(slipx.Tier.L2_DoubleTrack, p)
         self.state, self.seen = slipx.VehicleState(), slipx.StepDiagnostics()
@@ -169,7 +172,10 @@ class Multibody:
         p.tire.p_dx1 *= mu / lateral
         p.tire.p_dy1 = mu
         self.p = p
-        self.vehicle = dict(mass_kg=p.m, yaw_inertia_kgm2=p.I_z, l_f_m=p.a, l_r_m=p.b, h_cg_m=p.h_cg)
+        self.vehicle = dict(
+            mass_kg=p.m, yaw_inertia_kgm2=p.I_z, l_f_m=p.a, l_r_m=p.b, h_cg_m=p.h_cg,
+            drive_front_share=float(p.T_se), brake_front_share=float(p.T_sb),
+        )
         self.wheelbase_m, self.top_mps = p.a + p.b, 33.0
         self.wanted, self.acceleration, self.wheels = 0.0, 0.0, []
         self.tires = tire_model.formula_lateral_comb
@@ -352,8 +358,6 @@ DRIVES = [
     ("test_ford_mu07", lambda: Multibody(ford, 0.7), "serpentine", False, 0.7, 0.76, 35, 0.004),
     ("test_ford_mu08", lambda: Multibody(ford, 0.8), "kidney", False, 0.8, 0.76, 36, 0.004),
 ]
-
-
 
 
 def drawn(number, seed):

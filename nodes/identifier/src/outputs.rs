@@ -56,7 +56,7 @@ impl Outputs {
             stage: step.stage,
             max_iterations: step.config.max_iterations,
             change: last.map_or(f64::NAN, |i| i.change),
-            tolerance: step.config.tolerance,
+            tolerance: step.config.settled_below(),
             cost: last.map_or(f64::NAN, |i| i.fit_rmse),
             extrapolated_share: last.map_or(f64::NAN, |i| i.extrapolated_share),
             elapsed_s: step.elapsed.as_secs_f64(),

@@ -24,8 +24,8 @@ def refused(row):
     return int(row["iterations"]) == 0
 
 
-def ratio(row, axle):
-    return number(row, f"rmse_{axle}") / number(row, f"floor_{axle}")
+def ratio(row, axle, kind=""):
+    return number(row, f"{kind}rmse_{axle}") / number(row, f"{kind}floor_{axle}")
 
 
 def covered(row, name, truth=None):
@@ -43,26 +43,37 @@ def rate(hits, n):
 
 
 def plants(out):
-    every = rows("accuracy_plants.csv")
+    bags = rows("accuracy_bags.csv")
+    # Those of the draw are numbered: bmw_01; the others named after their friction.
+    drawn = lambda r: r["run"][-3] == "_"
     groups = [
-        ("Reference car, test", lambda r: " seed " in r["run"]),
-        ("slipx and CommonRoad, test", lambda r: r["run"].startswith("test_")),
-        ("Development (looked at while revising)", lambda r: " seed " not in r["run"] and not r["run"].startswith("test_")),
+        ("Reference car, test", rows("accuracy_reference.csv")),
+        ("slipx, test", [r for r in bags if drawn(r) and r["run"].startswith("slipx")]),
+        ("CommonRoad, test", [r for r in bags if drawn(r) and not r["run"].startswith("slipx")]),
+        ("Development (looked at while revising)", [r for r in bags if not drawn(r)]),
     ]
-    for title, inside in groups:
+    for title, group in groups:
+        balanced = "balanced_rmse_f" in group[0]
         out.append(f"\n### {title}\n")
-        out.append("| run | RMSE front | rear | ratio to the floor, front | rear | peak reached, front | rear | iterations | accepted |")
-        out.append("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
-        group = [r for r in every if inside(r)]
+        more = " loads balanced, front | rear |" if balanced else ""
+        out.append(f"| run | RMSE front | rear | ratio to the floor, front | rear |{more} peak reached, front | rear | iterations | accepted |")
+        out.append("| --- |" + " --- |" * (10 if balanced else 8))
         used = [r for r in group if not refused(r)]
         for r in used:
             yes = lambda key: "yes" if float(r[key]) else "no"
             out.append(
                 f"| {r['run']} | {number(r, 'rmse_f'):.4f} | {number(r, 'rmse_r'):.4f} | {ratio(r, 'f'):.2f} | {ratio(r, 'r'):.2f} | "
-                f"{yes('df_reached')} | {yes('dr_reached')} | {r['iterations']} | {yes('accepted')} |"
+                + (f"{ratio(r, 'f', 'balanced_'):.2f} | {ratio(r, 'r', 'balanced_'):.2f} | " if balanced else "")
+                + f"{yes('df_reached')} | {yes('dr_reached')} | {r['iterations']} | {yes('accepted')} |"
             )
         for axle, name in (("f", "front"), ("r", "rear")):
-            out.append(f"\nMedian ratio {name}: {statistics.median(ratio(r, axle) for r in used):.2f}")
+            text = f"\nMedian ratio {name}: {statistics.median(ratio(r, axle) for r in used):.2f}"
+            if balanced:
+                text += f"; loads balanced: {statistics.median(ratio(r, axle, 'balanced_') for r in used):.2f}"
+            out.append(text)
+    both = [r for title, group in groups[:3] for r in group if not refused(r)]
+    for axle, name in (("f", "front"), ("r", "rear")):
+        out.append(f"\nAll {len(both)} test drives, {name}: median {statistics.median(ratio(r, axle) for r in both):.2f}")
         for r in group:
             if refused(r):
                 out.append(f"\nRefused: {r['run']}: {r['reasons']}")
@@ -159,16 +170,16 @@ def paper(out):
     every = rows("paper.csv")
     for data, title in (("first", "Triggered in the first acceleration: the first 9 s"), ("whole", "The whole drive, 30 s")):
         out.append(f"\n## {title}\n")
-        out.append("| network | prior | RMSE front, median (range) | rear | turns at 0.02 | at 0.05 | settled | s, median |")
-        out.append("| --- | --- | --- | --- | --- | --- | --- | --- |")
+        out.append("| network | prior | RMSE front, median (range) | rear | turns | settled | s, median |")
+        out.append("| --- | --- | --- | --- | --- | --- | --- |")
         for prior in ("none", "0.8"):
             for network in ("mlp", "rnn", "s4"):
                 group = [r for r in every if (r["data"], r["prior"], r["network"]) == (data, prior, network)]
-                turns = [", ".join(r[k].replace("none", "-") for r in group) for k in ("turns_at_0.02", "turns_at_0.05")]
+                turns = ", ".join(r["turns"] for r in group)
                 settled = sum(r["converged"] == "true" for r in group)
                 figures = [spread([number(r, k) for r in group]) for k in ("rmse_front", "rmse_rear")]
                 seconds = statistics.median(number(r, "seconds") for r in group)
-                out.append(f"| {network} | {prior} | {figures[0]} | {figures[1]} | {turns[0]} | {turns[1]} | {settled} of {len(group)} | {seconds:.1f} |")
+                out.append(f"| {network} | {prior} | {figures[0]} | {figures[1]} | {turns} | {settled} of {len(group)} | {seconds:.1f} |")
     out.append("\n![RMSE of every network and drive](paper.svg)")
 
 
@@ -186,7 +197,7 @@ def robustness(out):
             r = at[car, kind]
             cells.append("refused" if refused(r) else f"{ratio(r, 'f'):.2f}/{ratio(r, 'r'):.2f}" + ("" if int(r["accepted"]) else " !"))
         out.append(f"| {kind} | " + " | ".join(cells) + " |")
-    out.append("\nLargest change of the end point, where the peak was reached, against the prior that is right (prior off by 0.3) and among 12 starts (mu0 0.3, 0.51, 0.8, 1.2, three shapes each):\n")
+    out.append("\nLargest change of the end point, on axles whose peak was reached, against the prior that is right (prior off by 0.3) and among 12 starts (mu0 0.3, 0.51, 0.8, 1.2, three shapes each):\n")
     out.append("| car | K, priors | D, priors | K, starts | D, starts |")
     out.append("| --- | --- | --- | --- | --- |")
     for car in cars:
@@ -199,7 +210,7 @@ def robustness(out):
                     abs(number(r, n) / number(base, n) - 1)
                     for r in group
                     for n in names
-                    if n[0] == "k" or (float(r[n + "_reached"]) and float(base[n + "_reached"]))
+                    if float(r["d" + n[1] + "_reached"]) and float(base["d" + n[1] + "_reached"])
                 ]
                 cells.append(f"{100 * max(change):.1f} %" if change else "not reached")
         out.append(f"| {car} | " + " | ".join(cells) + " |")

@@ -6,7 +6,7 @@
 //!
 //! Load transfer, relaxation and combined slip are on; the road's mu is 0.8, and so is the prior, as in the paper: its texture matches its friction.
 //! Each drive is used whole, and cut where the paper's experiment triggers: within the first acceleration, to the shortest drive that is identified from.
-//! Smoothing, end and directions of the sweep were chosen on seeds 21 to 24; the test drives had not been looked at. Others can be named.
+//! Smoothing, end and directions of the sweep, and when the loop ends, were chosen on seeds 21 to 24; the test drives had not been looked at. Others can be named.
 #[allow(dead_code)]
 mod support;
 
@@ -19,13 +19,11 @@ use support::picture::{Line, add, draw};
 use support::{floor, picture_and_seeds, reference_run, score};
 
 /// Test drives; odd ones go round the other way.
-const SEEDS: [u64; 4] = [76, 77, 78, 79];
+const SEEDS: [u64; 4] = [88, 89, 90, 91];
 /// Road and prior.
 const MU: f64 = 0.8;
 /// The paper's loop took 7 turns.
 const TURNS: u32 = 8;
-/// The loop ends at the first; the turns after which it would have ended at the other.
-const TOLERANCES: [f64; 2] = [0.02, 0.05];
 /// From standing through the first acceleration: less is refused.
 const FIRST_S: f32 = 9.0;
 const NETWORKS: [ResidualKind; 3] = [ResidualKind::Mlp, ResidualKind::Rnn, ResidualKind::S4];
@@ -50,7 +48,7 @@ fn first(whole: &StateSequence) -> StateSequence {
 fn main() -> Result<()> {
     let (picture, seeds) = picture_and_seeds(&SEEDS)?;
     println!(
-        "seed,data,network,prior,rmse_front,rmse_rear,floor_front,floor_rear,turns,converged,seconds,turns_at_0.02,turns_at_0.05,slip_front,slip_rear"
+        "seed,data,network,prior,rmse_front,rmse_rear,floor_front,floor_rear,turns,converged,seconds,slip_front,slip_rear"
     );
     let mut lines: Vec<Line> = Vec::new();
     let mut floors = [0.0; 2];
@@ -72,21 +70,11 @@ fn main() -> Result<()> {
                     let outcome = identify(sequence, &run.vehicle, prior, None, &config, &mut |_| {})?;
                     let seconds = begin.elapsed().as_secs_f64();
                     let rmse = score(&outcome.phi_p, &run.truth);
-                    let turns = TOLERANCES.map(|tolerance| {
-                        let first = outcome.history.iter().find(|turn| turn.change < tolerance);
-                        first.map_or("none".to_owned(), |turn| turn.iteration.to_string())
-                    });
                     let PerAxle { front, rear } = outcome.slip_range_rad.map(|slip| slip.high.max(-slip.low));
                     let (network, prior) = (residual.name(), prior.map_or("none", |_| "0.8"));
                     println!(
-                        "{seed},{data},{network},{prior},{:.4},{:.4},{:.4},{:.4},{},{},{seconds:.2},{},{front:.3},{rear:.3}",
-                        rmse[0],
-                        rmse[1],
-                        floor[0],
-                        floor[1],
-                        outcome.iterations,
-                        outcome.converged,
-                        turns.join(",")
+                        "{seed},{data},{network},{prior},{:.4},{:.4},{:.4},{:.4},{},{},{seconds:.2},{front:.3},{rear:.3}",
+                        rmse[0], rmse[1], floor[0], floor[1], outcome.iterations, outcome.converged
                     );
                     let with = if prior == "none" { "" } else { ", prior" };
                     let name = format!("{network}, {data} drive{with}");

@@ -80,7 +80,8 @@ impl<T> PerAxle<T> {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SignalCorrections {
-    /// The wheels follow the recorded steering by this much.
+    /// The wheels follow the recorded steering by this much: transport, the servo's lag and half a command's hold together, which one recorded
+    /// steering cannot tell apart.
     pub steering_delay_s: f64,
     /// Wheel angle over recorded steering.
     pub steering_gain: f64,

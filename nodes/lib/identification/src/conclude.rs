@@ -7,14 +7,15 @@ use gripsight_vehicle::{
 };
 
 use crate::data::Part;
-use crate::direct::{PeakEvidence, standard_error};
+use crate::direct::{PeakEvidence, axle_sigma, standard_error};
 use crate::judge::{best_starts, errors_over_horizon, one_step_errors, rollout_errors};
 use crate::picture::{curves, trace};
 use crate::rollout::{NAMES, PARAMETERS, SIGNALS, TireRollout, vector_of};
 use crate::tires::on_bound;
 use crate::{
     Change, Config, Estimate, FrictionPrior, HorizonError, Identification, Nuisance, Outcome, PeakFriction,
-    PerAxle, Range, Rmse, RmseReport, RunKey, SignalCorrections, SignalEstimates, Source, Trace, WeakSignal,
+    PerAxle, Range, ResidualKind, Rmse, RmseReport, RunKey, SignalCorrections, SignalEstimates, Source,
+    Trace, WeakSignal,
 };
 
 /// The residual loop has to beat the direct fit on the validation part by this share: of near equals the simpler wins.
@@ -166,11 +167,13 @@ pub(crate) fn conclude(run: &Identification, converged: bool) -> Outcome {
     outcome
 }
 
-/// The tires that predict the validation part best; the paper's method takes its last.
+/// The tires that predict the validation part best; with the paper's method those that leave the smallest residual on it.
 fn choose(run: &Identification) -> (PacejkaParameters, Source) {
-    let last = || run.history.last().map_or(run.initial, |turn| turn.phi_p);
+    let by_loop =
+        if run.config.residual == ResidualKind::None { Source::NominalLoop } else { Source::ResidualLoop };
     if run.config.method == crate::Method::Paper {
-        return (last(), Source::ResidualLoop);
+        let best = run.history.iter().min_by(|a, b| a.residual_left.total_cmp(&b.residual_left));
+        return (best.map_or(run.initial, |turn| turn.phi_p), by_loop);
     }
     let best = run.history.iter().min_by(|a, b| a.validation_rmse.total_cmp(&b.validation_rmse));
     let better = |tires: &PacejkaParameters, validation_rmse: f64| {
@@ -180,7 +183,7 @@ fn choose(run: &Identification) -> (PacejkaParameters, Source) {
     };
     match best {
         Some(turn) if !run.config.direct_start || better(&turn.phi_p, turn.validation_rmse) => {
-            (turn.phi_p, Source::ResidualLoop)
+            (turn.phi_p, by_loop)
         }
         _ => (run.direct.tires, Source::LeastSquares),
     }
@@ -214,7 +217,7 @@ fn peak_friction(run: &Identification, tires: &PacejkaParameters) -> PerAxle<Pea
             PeakFriction { value: axle.d, low, high, reached, from_prior: false }
         } else {
             let from_prior = peak.is_the_priors(run.prior);
-            let half = run.prior.filter(|_| from_prior).map_or(f64::NAN, |p| Estimate::Z90 * p.sigma);
+            let half = run.prior.filter(|_| from_prior).map_or(f64::NAN, |p| Estimate::Z90 * axle_sigma(p));
             PeakFriction {
                 value: axle.d,
                 low: (axle.d - half).max(0.0),

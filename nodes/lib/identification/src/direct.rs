@@ -5,12 +5,14 @@
 //!    which no simple model gets right, stays out of them.
 //! 2. All parameters on all windows. Gain and lever arm are freed only where that is worth it: at nearly one speed they are the stiffnesses in
 //!    disguise.
-//! 3. An axle whose peak the data do not reach gets its D from the friction prior, and step 2 is repeated with it; unless the data contradict it.
+//! 3. The friction prior bounds D softly on an axle whose peak the data do not reach, and the last fit is repeated with it; unless the data
+//!    contradict it. Where the peak is reached it has no say.
 //!
 //! Which is identifiable from what: the yaw rate's bias from the heading alone (fixed then); delay from transients; offset and bias of v_y from driving
 //! straight; gain (against K_f) and lever arm (against K_r) from a range of speeds, and from nothing else. Every one has a prior.
 
 mod peak;
+mod prior;
 mod signals;
 mod weights;
 
@@ -28,8 +30,10 @@ use crate::tires::{C_PRIOR, E_PRIOR, parameters};
 use crate::{FrictionPrior, IdentificationError, PerAxle, Range, SignalCorrections};
 
 pub(crate) use peak::{PeakEvidence, force_error};
+pub(crate) use prior::axle_sigma;
 
 use peak::evidence;
+use prior::{contradicts, with_prior};
 use signals::signal_parameters;
 use weights::{Weights, weights};
 
@@ -42,9 +46,6 @@ const FIRST_CORRELATION: f64 = 10.0;
 /// Step 1 looks at windows below this share of the largest lateral acceleration, and needs so many of them.
 const LOW_SHARE: f64 = 0.5;
 const LOW_WINDOWS: usize = 12;
-
-/// A friction prior contradicts the data where holding D at it raises what the windows miss by more than this: three standard errors.
-const CONTRADICTION: f64 = 9.0;
 
 /// Result of the direct fit.
 #[derive(Debug, Clone)]
@@ -93,8 +94,7 @@ pub(crate) fn direct(
 
     let first = MagicFormula::from_stiffness(FIRST_STIFFNESS, C_PRIOR.mean, grip, 0.0);
     let tires = warm.map_or(PacejkaParameters { front: first, rear: first }, |(tires, _)| *tires);
-    let mut all: Vec<Parameter> =
-        [tires.front, tires.rear].iter().flat_map(|axle| parameters(axle, prior)).collect();
+    let mut all: Vec<Parameter> = [tires.front, tires.rear].iter().flat_map(parameters).collect();
     all.extend(signal_parameters(data, vehicle));
     let signal_priors =
         std::array::from_fn(|j| all[SIGNALS + j].prior.unwrap_or(Prior { mean: 0.0, sigma: 1.0 }));
@@ -107,24 +107,13 @@ pub(crate) fn direct(
     let (slips, _) = fitter.visited(&found);
     let mut peak =
         PerAxle { front: evidence(&found, 0, &slips.front), rear: evidence(&found, 4, &slips.rear) };
-    if let Some(prior) = prior.filter(|_| !(peak.front.reached && peak.rear.reached)) {
-        let mut held = all.clone();
-        restart(&mut held, &found.parameters);
-        for (offset, axle) in [(0, &peak.front), (4, &peak.rear)] {
-            if axle.is_the_priors(Some(prior)) {
-                held[offset + 2].free = false;
-                held[offset + 2].start = prior.mu;
-                held[offset + 1].start = C_PRIOR.mean;
-                held[offset + 3].start = E_PRIOR.mean;
-            }
-        }
+    if let Some(prior) = prior {
+        let held = with_prior(&all, &found, &peak, prior);
         let with_it = fitter.solve(&held, &fitter.training, &weights.sigma, 30);
-        let misfit = |fit: &Fit| fit.linearization.window_costs.iter().sum::<f64>();
-        let bends = [&peak.front, &peak.rear].iter().any(|axle| !axle.reached && axle.may_bend);
-        if bends && misfit(&with_it) - misfit(&found) > CONTRADICTION {
+        if contradicts(prior, &peak, &found, &with_it) {
             peak.front.contradicts_prior = true;
             peak.rear.contradicts_prior = true;
-        } else {
+        } else if [peak.front, peak.rear].iter().any(|axle| axle.is_the_priors(Some(prior))) {
             (all, found) = (held, with_it);
         }
     }

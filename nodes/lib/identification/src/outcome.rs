@@ -19,14 +19,14 @@ pub struct PeakFriction {
     pub high: f64,
     /// Whether the data reach the peak of the curve.
     pub reached: bool,
-    /// Whether the value is the prior's and not the data's.
+    /// Whether the value is the prior's: a soft bound, within which the data may have moved it.
     pub from_prior: bool,
 }
 
 /// 90 % intervals of what was taken out of the signals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SignalEstimates {
-    /// s
+    /// s, the servo's lag and half a command's hold included
     pub steering_delay_s: Estimate,
     /// dimensionless
     pub steering_gain: Estimate,
@@ -130,6 +130,8 @@ pub struct IterationRecord {
     pub extrapolated_share: f64,
     /// Error of held-out rollouts with these tires (validation part).
     pub validation_rmse: f64,
+    /// Root mean square of the one-step residual that these tires leave over on the validation part, as a share of what the initial ones did.
+    pub residual_left: f64,
     /// Epochs that the residual was trained.
     pub epochs: usize,
     /// Its loss on the validation part.
@@ -163,6 +165,8 @@ pub enum Source {
     LeastSquares,
     /// The residual loop predicted held-out data better.
     ResidualLoop,
+    /// The loop without a network, a fit to the nominal model's own sweep, predicted held-out data better.
+    NominalLoop,
 }
 
 /// Time series for the report's pictures; not part of identification.json.
@@ -207,8 +211,8 @@ pub struct Outcome {
     pub peak_friction: PerAxle<PeakFriction>,
     /// Turns of the outer loop taken.
     pub iterations: u32,
-    /// Whether the last turn changed the tire curves by less than the tolerance, or (robust method) the last two no longer predict held-out data
-    /// better than what was there before them.
+    /// Whether the last turn changed the tire curves by less than the tolerance; or the last two (the paper's method: one) no longer predict
+    /// held-out data better than what was there before them.
     pub converged: bool,
     /// Whether the set may be used.
     pub accepted: bool,

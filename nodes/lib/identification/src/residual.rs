@@ -249,6 +249,14 @@ fn one_step(data: &Data, car: &SingleTrack, candidate: &Candidate) -> Vec<Stretc
     data.stretches.iter().map(stretch).filter(|s: &Stretch| !s.is_empty()).collect()
 }
 
+/// Root mean squares of the paper's residual with a candidate's tires on the validation part: v_y in m/s, yaw rate in rad/s.
+pub(crate) fn left_over(data: &Data, vehicle: &VehicleParameters, candidate: &Candidate) -> [f64; 2] {
+    let stretches = one_step(data, &SingleTrack::new(vehicle, &candidate.phi_p), candidate);
+    let held_out = || stretches.iter().flatten().filter(|s| s.part == Part::Validation);
+    let samples = held_out().count().max(1) as f64;
+    std::array::from_fn(|c| (held_out().map(|s| s.residual[c].powi(2)).sum::<f64>() / samples).sqrt())
+}
+
 fn stiffest(candidate: &Candidate) -> f64 {
     candidate.phi_p.front.normalized_stiffness().max(candidate.phi_p.rear.normalized_stiffness())
 }

@@ -16,6 +16,7 @@ use crate::data::{Data, MIN_WINDOWS, Part};
 use crate::direct::{Direct, direct};
 use crate::extract::extract;
 use crate::judge::rollout_errors;
+use crate::residual::left_over;
 use crate::rollout::{TireRollout, vector_of};
 use crate::sweep::{Point, sweep};
 use crate::tires::curve_change;
@@ -80,6 +81,8 @@ pub struct Identification {
     /// Turns taken.
     pub(crate) history: Vec<IterationRecord>,
     pub(crate) candidate: Candidate,
+    /// What the initial tires leave over, see [`left_over`].
+    initial_left: [f64; 2],
     ended: bool,
 }
 
@@ -141,9 +144,11 @@ impl Identification {
             direct_error: f64::INFINITY,
             history: Vec::new(),
             candidate,
+            initial_left: [1.0; 2],
             ended: false,
         };
         run.direct_error = run.validation_error(&run.direct.tires);
+        run.initial_left = run.left_over(&run.initial);
         Ok(Started::Running(Box::new(run)))
     }
 
@@ -173,7 +178,7 @@ impl Identification {
             return Err(IdentificationError::WrongModel { expected, got });
         }
         let turn = self.turn(model)?;
-        let settled = turn.change < self.config.tolerance;
+        let settled = turn.change < self.config.settled_below();
         self.candidate.phi_p = turn.phi_p;
         self.candidate.key.iteration = turn.iteration;
         self.history.push(turn);
@@ -185,11 +190,15 @@ impl Identification {
         Ok(Next::Candidate(self.candidate.clone()))
     }
 
-    /// The robust method ends where the last turns no longer predict the validation part better than what was there before them.
+    /// The paper's method ends where a turn leaves no less of the held-out data unexplained than the best before it; the robust one where the last
+    /// turns no longer predict the validation part better than what was there before them.
     fn stalled(&self) -> bool {
         const TURNS: usize = 2;
+        if let (Method::Paper, [before @ .., last]) = (self.config.method, &self.history[..]) {
+            return before.iter().any(|turn| turn.residual_left <= last.residual_left);
+        }
         let Some(before) = self.history.len().checked_sub(TURNS) else { return false };
-        if self.config.method == Method::Paper || !self.config.direct_start {
+        if !self.config.direct_start {
             return false;
         }
         let errors =
@@ -220,9 +229,20 @@ impl Identification {
             sweep_speed_mps: swept.speed_mps,
             extrapolated_share: swept.extrapolated_share,
             validation_rmse: self.validation_error(&phi_p),
+            residual_left: self.residual_left(&phi_p),
             epochs: model.epochs,
             residual_loss: model.validation_loss,
         })
+    }
+
+    fn left_over(&self, tires: &PacejkaParameters) -> [f64; 2] {
+        left_over(&self.data, &self.vehicle, &Candidate { phi_p: *tires, ..self.candidate.clone() })
+    }
+
+    /// What some tires leave over, as a share of what the initial ones did.
+    fn residual_left(&self, tires: &PacejkaParameters) -> f64 {
+        let [v_y, yaw_rate] = self.left_over(tires);
+        (0.5 * ((v_y / self.initial_left[0]).powi(2) + (yaw_rate / self.initial_left[1]).powi(2))).sqrt()
     }
 
     /// Error of rollouts on the validation part, in noises.

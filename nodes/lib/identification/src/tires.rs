@@ -3,7 +3,7 @@
 use gripsight_vehicle::{MagicFormula, PacejkaParameters};
 
 use crate::shooting::{Parameter, Prior};
-use crate::{FrictionPrior, PerAxle, Range};
+use crate::{PerAxle, Range};
 
 /// Normalised stiffness B C D, 1/rad. Road tires have 8-20, slicks under downforce up to 60, a 1:10 car on a dusty floor 2.
 pub const STIFFNESS_BOUNDS: (f64, f64) = (0.5, 100.0);
@@ -27,7 +27,7 @@ pub(crate) const D_PRIOR: Prior = Prior { mean: 0.9, sigma: 0.6 };
 pub const BOUNDS: [(f64, f64); 4] = [B_BOUNDS, C_BOUNDS, D_BOUNDS, E_BOUNDS];
 
 /// The four parameters (k, C, D, E) of an axle as the shooting fit sees them.
-pub(crate) fn parameters(start: &MagicFormula, prior: Option<FrictionPrior>) -> [Parameter; 4] {
+pub(crate) fn parameters(start: &MagicFormula) -> [Parameter; 4] {
     let parameter = |start, bounds: (f64, f64), prior| Parameter {
         start,
         low: bounds.0,
@@ -35,19 +35,13 @@ pub(crate) fn parameters(start: &MagicFormula, prior: Option<FrictionPrior>) -> 
         free: true,
         prior,
     };
-    let d = prior.map_or(D_PRIOR, |p| Prior { mean: p.mu, sigma: SOFTENED * p.sigma.max(LEAST_SIGMA) });
     [
         parameter(start.normalized_stiffness(), STIFFNESS_BOUNDS, None),
         parameter(start.c, C_BOUNDS, Some(C_PRIOR)),
-        parameter(start.d, D_BOUNDS, Some(d)),
+        parameter(start.d, D_BOUNDS, Some(D_PRIOR)),
         parameter(start.e, E_BOUNDS, Some(E_PRIOR)),
     ]
 }
-
-/// No friction prior is trusted further than this: a picture does not see the tires.
-const LEAST_SIGMA: f64 = 0.05;
-/// Where the peak is reached the data decide: the prior is softened by this.
-const SOFTENED: f64 = 3.0;
 
 /// Names of the parameters on a bound, such as `rear.c`.
 pub(crate) fn on_bound(tires: &PacejkaParameters) -> Vec<String> {

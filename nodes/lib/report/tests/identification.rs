@@ -104,6 +104,7 @@ fn outcome() -> Outcome {
                 sweep_speed_mps: 3.2,
                 extrapolated_share: 0.2,
                 validation_rmse: 2.4,
+                residual_left: 0.3,
                 epochs: 60,
                 residual_loss: 0.4,
             })

@@ -1,7 +1,8 @@
 //! Scores the identification against true forces and true signal errors.
 //!
 //! ```text
-//! accuracy plants FOLDER...                the reference car's test drives, and bag folders with `truth_axle_forces.csv`
+//! accuracy reference                       the reference car's test drives
+//! accuracy bags FOLDER...                  bag folders with `truth_axle_forces.csv`
 //! accuracy draws FROM TO DURATION_S [OFF]  drives drawn from seeds: what intervals, and claims of a peak, are worth; with a prior OFF from the road's mu
 //! accuracy robustness                      one drive under worse and worse recording, and from other starts and priors
 //! ```
@@ -19,7 +20,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use gripsight_identification::{Config, FrictionPrior, ResidualKind, identify};
-use support::{Run, floor, read_with_truth, reference, reference_run, score, truth_of};
+use support::{Run, balanced, floor, read_with_truth, reference, reference_run, score, truth_of};
 
 /// Test drives of the reference car with all background effects, perfect mounting and no signal errors: car, track, friction, pace, seed.
 const DRIVES: [(&str, &str, f64, f64, u64); 16] = [
@@ -49,7 +50,7 @@ fn header() -> String {
     let peak = |a: char| format!("d{a}_floor,d{a}_true,d{a},d{a}_lo,d{a}_hi,d{a}_reached");
     let signals = SIGNALS.map(|n| format!("{n}_true,{n},{n}_lo,{n}_hi")).join(",");
     format!(
-        "run,rmse_f,floor_f,rmse_r,floor_r,{},{},{},{},{signals},relax,combined,transfer,slip_f,slip_r,seconds,iterations,accepted,reasons",
+        "run,rmse_f,floor_f,rmse_r,floor_r,balanced_rmse_f,balanced_floor_f,balanced_rmse_r,balanced_floor_r,{},{},{},{},{signals},relax,combined,transfer,slip_f,slip_r,seconds,iterations,accepted,reasons",
         axle('f'),
         axle('r'),
         peak('f'),
@@ -74,6 +75,9 @@ pub(crate) fn row(
     let mut cells = vec![run.name.clone()];
     let mut add = |values: &[f64]| cells.extend(values.iter().map(|v| format!("{v:.4}")));
     add(&[rmse[0], floors[0].1, rmse[1], floors[1].1]);
+    let truth = balanced(&run.truth, &run.vehicle);
+    let rmse = score(&outcome.phi_p, &truth);
+    add(&[rmse[0], floor(&truth.front)?.1, rmse[1], floor(&truth.rear)?.1]);
     let stiffness = &outcome.cornering_stiffness_n_per_rad;
     for (k, load_n, floor) in
         [(&stiffness.front, loads_n[0], &floors[0]), (&stiffness.rear, loads_n[1], &floors[1])]
@@ -115,14 +119,16 @@ const PLAIN: [f64; 6] = [0.5 * cases::HOLD_S, 1.0, 0.0, 0.0, 0.0, 0.0];
 
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let Some((mode, rest)) = arguments.split_first() else { bail!("plants, draws or robustness?") };
+    let Some((mode, rest)) = arguments.split_first() else { bail!("reference, bags, draws or robustness?") };
     println!("{}", header());
     match (mode.as_str(), rest) {
-        ("plants", folders) => {
+        ("reference", []) => {
             for (car, track, mu, pace, seed) in DRIVES {
                 let run = reference_run(car, track, mu, pace, seed, true);
                 println!("{}", row(&run, PLAIN, None, &Config::default())?);
             }
+        }
+        ("bags", folders) => {
             for folder in folders {
                 let run = read_with_truth(Path::new(folder), f64::INFINITY)?;
                 println!("{}", row(&run, PLAIN, None, &Config::default())?);

@@ -25,6 +25,15 @@ pub(crate) fn picture_and_seeds(seeds: &[u64]) -> Result<(PathBuf, Vec<u64>)> {
 pub(crate) struct Truth {
     pub(crate) slip_rad: Vec<f64>,
     pub(crate) force: Vec<f64>,
+    pub(crate) mean_load_n: f64,
+}
+
+impl Truth {
+    /// Adds a lateral force and the load under it.
+    fn push(&mut self, lateral_n: f64, load_n: f64) {
+        self.force.push(lateral_n / load_n);
+        self.mean_load_n += (load_n - self.mean_load_n) / self.force.len() as f64;
+    }
 }
 
 /// A run with its truth.
@@ -61,8 +70,8 @@ pub(crate) fn truth_of(recording: &Recording, vehicle: &VehicleParameters) -> Pe
             .slip_rad
             .push(m.steering_rad - ((m.v_y_mps + vehicle.l_f_m * m.yaw_rate_radps) / m.v_x_mps).atan());
         truth.rear.slip_rad.push(-((m.v_y_mps - vehicle.l_r_m * m.yaw_rate_radps) / m.v_x_mps).atan());
-        truth.front.force.push(f[1] / f[2]);
-        truth.rear.force.push(r[1] / r[2]);
+        truth.front.push(f[1], f[2]);
+        truth.rear.push(r[1], r[2]);
     }
     truth
 }
@@ -118,8 +127,8 @@ pub(crate) fn read_with_truth(folder: &Path, length_s: f64) -> Result<Run> {
         }
         truth.front.slip_rad.push(steering - ((v_y + vehicle.l_f_m * yaw_rate) / v_x).atan());
         truth.rear.slip_rad.push(-((v_y - vehicle.l_r_m * yaw_rate) / v_x).atan());
-        truth.front.force.push(get(wanted[1])? / loads[0]);
-        truth.rear.force.push(get(wanted[2])? / loads[1]);
+        truth.front.push(get(wanted[1])?, loads[0]);
+        truth.rear.push(get(wanted[2])?, loads[1]);
     }
     Ok(Run {
         name: folder.file_name().unwrap_or_default().to_string_lossy().into_owned(),
@@ -127,6 +136,19 @@ pub(crate) fn read_with_truth(folder: &Path, length_s: f64) -> Result<Run> {
         sequence,
         truth,
     })
+}
+
+/// The same with the car's weight shared between the axles as the vehicle's l_f and l_r share it. A plant whose wheels carry at rest what the lever
+/// arms of its yaw equation do not allow shows that in no motion.
+pub(crate) fn balanced(truth: &PerAxle<Truth>, vehicle: &VehicleParameters) -> PerAxle<Truth> {
+    let weight_n = truth.front.mean_load_n + truth.rear.mean_load_n;
+    let axle = |t: &Truth, share: f64| {
+        let mean_load_n = share * weight_n;
+        let force = t.force.iter().map(|f| f * t.mean_load_n / mean_load_n).collect();
+        Truth { slip_rad: t.slip_rad.clone(), force, mean_load_n }
+    };
+    let front_share = vehicle.l_r_m / vehicle.wheelbase_m();
+    PerAxle { front: axle(&truth.front, front_share), rear: axle(&truth.rear, 1.0 - front_share) }
 }
 
 /// Root mean square error of F_y/F_z of an axle.
@@ -144,6 +166,7 @@ pub(crate) fn floor(truth: &Truth) -> Result<(MagicFormula, f64)> {
     let thin = Truth {
         slip_rad: truth.slip_rad.iter().copied().step_by(5).collect(),
         force: truth.force.iter().copied().step_by(5).collect(),
+        ..*truth
     };
     let mut best = (axle(&[10.0, 1.4, 1.0, 0.0]), f64::INFINITY);
     for start in [[4.0, 1.3, 0.6, 0.0], [10.0, 1.4, 1.0, 0.0], [20.0, 1.8, 1.2, -1.0]] {

@@ -69,7 +69,9 @@ fn the_indy_car_has_stiffness_but_no_peak() {
         (with_prior.peak_friction.rear, with_prior.phi_p.rear.d),
     ] {
         assert!(peak.from_prior && !peak.reached);
-        assert_eq!(d, 1.0);
+        // A soft bound: D is the prior's within what lies between a road and an axle.
+        assert_eq!(peak.value, d);
+        assert!((d - 1.0).abs() < 0.1 && peak.low < 1.0 && 1.0 < peak.high, "{peak:?}");
     }
 }
 

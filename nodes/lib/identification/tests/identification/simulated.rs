@@ -140,6 +140,20 @@ fn the_papers_method_runs_with_every_residual() {
 }
 
 #[test]
+fn a_prior_has_no_say_where_the_peaks_are_reached() {
+    let (_, sequence, vehicle) =
+        drive(with_background(scenario("formula_student", "bean", 0.8, 0.95, 18)).duration(20.0));
+    let ends = [None, Some(0.5), Some(1.1)].map(|mu| {
+        let prior = mu.map(|mu| FrictionPrior { mu, sigma: 0.1 });
+        let outcome = identify(&sequence, &vehicle, prior, None, &quick(), &mut |_| {}).unwrap();
+        assert!(outcome.peak_friction.front.reached && outcome.peak_friction.rear.reached);
+        outcome.least_squares
+    });
+    assert_eq!(ends[0], ends[1]);
+    assert_eq!(ends[0], ends[2]);
+}
+
+#[test]
 fn telemetry_that_cannot_tell_is_refused_with_a_figure() {
     let (_, sequence, vehicle) = drive(scenario("f1tenth", "club", 0.9, 0.9, 9).duration(15.0));
     let cut = |n: usize| StateSequence {

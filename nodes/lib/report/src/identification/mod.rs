@@ -114,6 +114,7 @@ fn how(outcome: &Outcome) -> String {
         Source::Start => "the start: nothing was fitted",
         Source::LeastSquares => "the direct least-squares fit",
         Source::ResidualLoop => "the residual loop",
+        Source::NominalLoop => "the loop without a network",
     };
     let turns = outcome.iterations;
     let end = if outcome.converged { "converged" } else { "not converged" };
