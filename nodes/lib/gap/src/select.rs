@@ -5,6 +5,7 @@ use gripsight_identification::shooting::Rollout;
 use crate::effects::EffectId;
 use crate::engine::{Engine, State};
 use crate::screen::{Screened, Screening, screen};
+use crate::sizes::is_misshapen;
 use crate::smooth::median;
 use crate::windows::Windows;
 
@@ -326,18 +327,19 @@ impl Round {
 
 /// What candidates are ranked by: the drop of the cost, less a price for every parameter.
 fn score(r: &Refit) -> f64 {
-    const PRICE: f64 = 6.0;
+    /// About the logarithm of the number of residuals: the Bayesian information criterion.
+    const PRICE: f64 = 10.0;
     if r.relative_size >= thresholds::MOST_SIZE {
         return 0.0;
     }
-    r.gain - PRICE * r.effect.sizing() as f64
+    r.gain - PRICE * r.effect.spec().parameters.len() as f64
 }
 
-/// Of near equals the one with fewer parameters wins.
+/// Of near equals the one with fewer parameters that size it wins; a shape at its bound counts as one.
 fn prefer_simple(refits: &mut [Refit]) {
     let Some(best) = refits.first().map(score) else { return };
     let near = |r: &Refit| score(r) > best - thresholds::NEAR_SHARE * 0.4 * best.max(0.0);
-    let count = |r: &Refit| r.effect.sizing();
+    let count = |r: &Refit| r.effect.sizing() + usize::from(is_misshapen(&r.state, r.effect));
     if let Some(place) = (1..refits.len())
         .filter(|&i| near(&refits[i]) && count(&refits[i]) < count(&refits[0]))
         .min_by_key(|&i| (count(&refits[i]), i))

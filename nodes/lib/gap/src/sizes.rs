@@ -55,9 +55,16 @@ pub(crate) fn sizes(
         .collect()
 }
 
+/// Whether a parameter that shapes the effect is held by its upper bound: a lag that wants less damping than any servo has is no lag.
+pub(crate) fn is_misshapen(state: &State, effect: EffectId) -> bool {
+    let (Some(own), Some(fit)) = (state.of(effect), &state.fit) else { return false };
+    let from = first_row(state, effect);
+    let held = |i: usize| fit.on_bound.contains(&(from + i)) && own[i] > effect.spec().parameters[i].null;
+    !effect.is_of_a_place() && (effect.sizing()..own.len()).any(held)
+}
+
 /// Whether a size is told by the data: one at least of the parameters that size the effect has an interval without the value at which it is
-/// `absent`, and none is held by its bound, nor is a shape by its upper one: a lag that wants less damping than any servo has is
-/// no lag. What sits in one part of the lap is in few blocks: their scatter says nothing.
+/// `absent`, none is held by its bound, and the effect is not misshapen. What sits in one part of the lap is in few blocks: their scatter says nothing.
 pub(crate) fn is_told(state: &State, effect: EffectId, absent: &[f64], blocks: &[usize]) -> bool {
     let Some(own) = state.of(effect) else { return false };
     let halves = half_widths(state, effect, own, blocks);
@@ -68,8 +75,7 @@ pub(crate) fn is_told(state: &State, effect: EffectId, absent: &[f64], blocks: &
         state.fit.as_ref().is_some_and(|f| f.on_bound.contains(&(from + i))) && away(i).abs() > 1e-9
     };
     let told = effect.is_of_a_place() || (0..sizing).any(|i| away(i).abs() > halves[i]);
-    let shaped = !effect.is_of_a_place() && (sizing..own.len()).any(|i| held(i) && away(i) > 0.0);
-    told && !shaped && !(0..sizing).any(held)
+    told && !is_misshapen(state, effect) && !(0..sizing).any(held)
 }
 
 /// Place of an effect's first parameter in a state.
