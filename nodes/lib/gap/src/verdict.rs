@@ -193,14 +193,14 @@ pub(crate) fn looks(engine: &Engine<'_>, evidence: &[Round], last: &Round, state
         .zip(evidence.iter().chain([last]))
         .map(|(about, round)| Look {
             about: about.map(EffectId::name),
-            cost: round.before.cost / round.before.residuals(),
+            cost: round.before.cost / round.before.residuals,
             compared: round
                 .refits
                 .iter()
                 .zip(&round.lead_z)
                 .map(|(r, &behind_z)| Comparison {
                     name: r.effect.name(),
-                    gain: r.gain / round.before.residuals(),
+                    gain: r.gain / round.before.residuals,
                     z: r.z,
                     behind_z,
                     alike: round.winner().map_or(0.0, |w| round.screening.cosine(w.effect, r.effect)),
@@ -250,7 +250,7 @@ fn confidence(round: &Round, effect: EffectId, confused: &[EffectId]) -> f64 {
         .fold(f64::INFINITY, f64::min);
     let sure = |z: f64| normal(z / DOUBT);
     let alone = 1.0 / (1.0 + confused.len() as f64 * 0.5);
-    let gain = best.gain / round.before.residuals();
+    let gain = best.gain / round.before.residuals;
     let clear = (gain / (gain + FAINT)).max(0.5);
     let believable = if best.relative_size > LARGE && !effect.is_of_a_place() { 0.5 } else { 1.0 };
     (sure(best.z.max(2.0 * DOUBT))

@@ -3,7 +3,7 @@
 use gripsight_vehicle::Real;
 
 use super::{Effect, EffectSpec, ParameterSpec, Reported, both_sides, positive, spec};
-use crate::terms::{delayed, lagged};
+use crate::terms::{Lag, delayed};
 
 /// The wheels follow the command with a first-order lag.
 #[derive(Debug)]
@@ -23,9 +23,10 @@ impl Effect for SteeringLag {
 
     fn steer<T: Real>(p: &[T], steering_rad: &mut [T], dt_s: f64) {
         let Some(&first) = steering_rad.first() else { return };
+        let lag = Lag::new(dt_s, p[0]);
         let (mut before, mut y) = (first, first);
         for u in steering_rad.iter_mut() {
-            y = lagged(y, before, *u, dt_s, p[0]);
+            y = lag.step(y, before, *u);
             before = *u;
             *u = y;
         }
