@@ -47,7 +47,7 @@ pub(crate) struct IdentifyArgs {
     /// The car, as a ROS 2 parameter file; without it, an F1TENTH-class 1:10 car.
     #[arg(long, value_name = "FILE")]
     vehicle: Option<PathBuf>,
-    /// What is believed of the peak friction: where D starts, and where it stays if the peak is not reached.
+    /// What is believed of the peak friction: where D starts, and its soft bound if the peak is not reached.
     #[arg(long, value_name = "MU", conflicts_with = "camera", value_parser = positive)]
     prior_mu: Option<f64>,
     /// Standard deviation of that belief.

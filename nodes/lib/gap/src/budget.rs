@@ -100,7 +100,7 @@ impl Budget {
         for count in 1..state.named.len() {
             let named = &state.named[..count];
             let values = engine.carry(state, named);
-            let step = engine.fit(named, &values, None, &windows.training, STEP_ITERATIONS);
+            let step = engine.look(named, &values, None, &windows.training, STEP_ITERATIONS);
             steps.push(blocks(&step.effects, None, &step.parameters));
         }
         if !state.named.is_empty() {
@@ -112,14 +112,17 @@ impl Budget {
             .filter_map(|r| {
                 let (named, values) = (&r.state.named, &r.state.parameters);
                 let from = steps.last()?;
-                let fitted = engine.fit(named, values, None, &windows.training, CANDIDATE_ITERATIONS);
+                let fitted = engine.look(named, values, None, &windows.training, CANDIDATE_ITERATIONS);
                 Some((r.effect, closed(from, &blocks(&fitted.effects, None, &fitted.parameters), &retuned)))
             })
             .collect();
         let slip = large_slip_rad(engine, null, &windows.training);
         let flexible = Flexible::new(engine.recording, slip, engine.vehicle.wheelbase_m(), &Room::ALL);
-        let ceiling = engine.fit_flexible(state, &flexible, &windows.training);
-        let residual = Residual::learned(engine, null, &windows.training).map(|residual| {
+        let (ceiling, residual) = rayon::join(
+            || engine.fit_flexible(state, &flexible, &windows.training),
+            || Residual::learned(engine, null, &windows.training),
+        );
+        let residual = residual.map(|residual| {
             let model = ExtendedModel { residual: Some(&residual), ..scorer.model(&null.effects, None) };
             by_block(scorer.recording, on, &scorer.score_model(&model, &null.parameters, on))
         });

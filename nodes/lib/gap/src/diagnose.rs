@@ -110,7 +110,7 @@ fn explain(
     // The search works on a bounded number of windows, the final fit on all.
     let search_windows = windows.training.thinned(SEARCH_WINDOWS);
     let blank = engine.blank();
-    let first = engine.fit(&[], &blank, None, &search_windows, 25);
+    let first = engine.look(&[], &blank, None, &search_windows, 25);
     if !first.finite {
         return Err(GapError::NotFinite);
     }
@@ -211,13 +211,13 @@ fn fit_tires(
         .map(|&start| {
             let engine =
                 Engine::new(recording, vehicle, PacejkaParameters::from_array(start), TireTrust::free());
-            let state = engine.fit(&[], &engine.blank(), None, &windows, FIRST);
+            let state = engine.look(&[], &engine.blank(), None, &windows, FIRST);
             (engine, state)
         })
         .filter(|(_, state)| state.finite)
         .min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
     let (engine, state) = best.ok_or(GapError::NotFinite)?;
-    let state = engine.fit(&[], &state.parameters, Some(state.starts), &windows, REST);
+    let state = engine.look(&[], &state.parameters, Some(state.starts), &windows, REST);
     if state.finite { Ok(state.tires()) } else { Err(GapError::NotFinite) }
 }
 

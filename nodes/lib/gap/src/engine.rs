@@ -1,7 +1,7 @@
 //! One engine for everything that is fitted or scored: the extended model on windows with free starts.
 
 use gripsight_identification::shooting::{
-    self, Fit, Linearization, Parameter, Prior, Problem, StopReason, Window,
+    self, Descent, Fit, Linearization, Parameter, Prior, Problem, StopReason, Window,
 };
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters, handling};
 
@@ -49,7 +49,10 @@ pub(crate) struct State {
     pub(crate) starts: Vec<[f64; 2]>,
     pub(crate) cost: f64,
     pub(crate) window_costs: Vec<f64>,
+    /// Residuals that its fit counted.
+    pub(crate) residuals: f64,
     pub(crate) finite: bool,
+    /// The problem around it, where it was fitted to the end.
     pub(crate) fit: Option<Box<Fit>>,
 }
 
@@ -65,11 +68,6 @@ impl State {
             from += n;
         }
         None
-    }
-
-    /// Residuals that its fit counted.
-    pub(crate) fn residuals(&self) -> f64 {
-        self.fit.as_ref().map_or(1.0, |f| f.linearization.residuals as f64)
     }
 
     pub(crate) fn tires(&self) -> PacejkaParameters {
@@ -332,21 +330,65 @@ impl<'a> Engine<'a> {
         windows: &Windows,
         max_iterations: usize,
     ) -> State {
+        self.fitted(named, values, windows, max_iterations, |problem| {
+            let fit = shooting::fit(problem, starts);
+            let end = Descent {
+                parameters: fit.parameters.clone(),
+                starts: fit.starts.clone(),
+                at: fit.linearization.evaluation(),
+                stop: fit.stop,
+                iterations: fit.iterations,
+            };
+            (end, Some(Box::new(fit)))
+        })
+    }
+
+    /// [`Self::fit`] without the derivatives at its end.
+    pub(crate) fn look(
+        &self,
+        named: &[EffectId],
+        values: &[f64],
+        starts: Option<Vec<[f64; 2]>>,
+        windows: &Windows,
+        max_iterations: usize,
+    ) -> State {
+        let descend = |problem: &Problem<'_, _>| (shooting::descend(problem, starts), None);
+        self.fitted(named, values, windows, max_iterations, descend)
+    }
+
+    fn fitted(
+        &self,
+        named: &[EffectId],
+        values: &[f64],
+        windows: &Windows,
+        max_iterations: usize,
+        solve: impl FnOnce(&Problem<'_, ExtendedModel<'a>>) -> (Descent, Option<Box<Fit>>),
+    ) -> State {
         let effects = self.layout(named);
         let model = self.model(&effects, None);
         let parameters = self.parameters(named, &effects, values, 1.0);
-        let fit = shooting::fit(&self.problem(&model, &windows.windows, &parameters, max_iterations), starts);
+        let (end, fit) = solve(&self.problem(&model, &windows.windows, &parameters, max_iterations));
         State {
             named: named.to_vec(),
             effects,
-            parameters: fit.parameters.clone(),
             free: (0..parameters.len()).filter(|&j| parameters[j].free).collect(),
-            starts: fit.starts.clone(),
-            cost: fit.linearization.cost,
-            window_costs: fit.linearization.window_costs.clone(),
-            finite: fit.stop != StopReason::NotFinite,
-            fit: Some(Box::new(fit)),
+            parameters: end.parameters,
+            starts: end.starts,
+            cost: end.at.cost,
+            window_costs: end.at.window_costs,
+            residuals: end.at.residuals as f64,
+            finite: end.stop != StopReason::NotFinite,
+            fit,
         }
+    }
+
+    /// The cost of a state, per residual, as this engine counts it.
+    pub(crate) fn cost(&self, state: &State, windows: &Windows) -> f64 {
+        let model = self.model(&state.effects, None);
+        let parameters = self.parameters(&state.named, &state.effects, &state.parameters, 1.0);
+        let problem = self.problem(&model, &windows.windows, &parameters, 0);
+        let at = shooting::evaluate(&problem, &state.parameters, &state.starts);
+        at.cost / at.residuals as f64
     }
 
     /// Fits flexible terms on top of a state, whose own parameters stay: an upper bound of what an additive term explains.
@@ -359,7 +401,7 @@ impl<'a> Engine<'a> {
         let own = state.parameters.len();
         parameters[..own].iter_mut().for_each(|p| p.free = false);
         let problem = self.problem(&model, &windows.windows, &parameters, STEPS);
-        shooting::fit(&problem, Some(state.starts.clone())).parameters
+        shooting::descend(&problem, Some(state.starts.clone())).parameters
     }
 
     /// One Jacobian of all parameters of a model.
@@ -374,6 +416,23 @@ impl<'a> Engine<'a> {
         let model = self.model(effects, None);
         let parameters = self.parameters(named, effects, values, 1.0);
         shooting::linearize(&self.problem(&model, &windows.windows, &parameters, 0), values, starts)
+    }
+
+    /// Half the derivative of the cost by one parameter of a model, and the information on it, all others fixed.
+    pub(crate) fn slope(
+        &self,
+        effects: &[EffectId],
+        values: &[f64],
+        place: usize,
+        starts: &[[f64; 2]],
+        windows: &Windows,
+    ) -> (f64, f64) {
+        let model = self.model(effects, None);
+        let mut parameters = self.parameters(effects, effects, values, 1.0);
+        parameters.iter_mut().enumerate().for_each(|(j, p)| p.free = j == place);
+        let problem = self.problem(&model, &windows.windows, &parameters, 0);
+        let here = shooting::linearize(&problem, values, starts);
+        (here.gradient[0], here.information[(0, 0)])
     }
 
     /// Best starts for fixed parameters, and the plain sum of squares of each window in units of the noise.
@@ -407,8 +466,8 @@ impl<'a> Engine<'a> {
             robust_k: f64::INFINITY,
             max_iterations: 6,
         };
-        let fit = shooting::fit(&problem, None);
-        Score { squares: fit.linearization.window_costs, starts: fit.starts }
+        let end = shooting::descend(&problem, None);
+        Score { squares: end.at.window_costs, starts: end.starts }
     }
 }
 

@@ -174,9 +174,7 @@ impl<'a> ExtendedModel<'a> {
             effect.car(values, &mut car);
         }
         let (steering, run_in) = self.road_wheel_angles(p, window);
-        let (before, steering) = steering.split_at(run_in);
-        let mover = Mover { model: self, p, car, tires, before, steering, window, push };
-        let mut outputs = mover.run(start);
+        let mut outputs = Mover::new(self, p, &car, tires, &steering, run_in, window).run(start, push);
         let shift = car.cog_shift_m;
         for k in 0..outputs.v_y_mps.len() {
             let (r, acceleration) = (outputs.yaw_rate_radps[k], outputs.yaw_acceleration_radps2[k]);

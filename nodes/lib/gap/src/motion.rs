@@ -7,8 +7,9 @@ use gripsight_identification::shooting::Window;
 use gripsight_vehicle::{PacejkaParameters, Real};
 
 use crate::effects::EffectId;
+use crate::flexible::Push;
 use crate::model::ExtendedModel;
-use crate::terms::{Axle, Car, Moment, Motion, Outputs, lagged};
+use crate::terms::{Axle, Axles, Car, Lag, Moment, Motion, Outputs};
 
 /// Below this forward speed slip angles mean nothing; the model is evaluated as if at this speed.
 const MIN_SPEED_MPS: f64 = 0.2;
@@ -17,21 +18,29 @@ const ROLL_TIME_S: f64 = 0.08;
 
 /// Runs the car over one window.
 pub(crate) struct Mover<'m, 'a, T> {
-    pub(crate) model: &'m ExtendedModel<'a>,
-    pub(crate) p: &'m [T],
-    pub(crate) car: Car<T>,
-    pub(crate) tires: PacejkaParameters<T>,
+    model: &'m ExtendedModel<'a>,
+    p: &'m [T],
+    car: &'m Car<T>,
+    axles_at_rest: Axles<T>,
+    tires: PacejkaParameters<T>,
     /// Road-wheel angles before the window, up to its start.
-    pub(crate) before: &'m [T],
+    before: &'m [T],
     /// Road-wheel angles in the window.
-    pub(crate) steering: &'m [T],
-    pub(crate) window: &'m Window,
-    /// Accelerations of v_y and yaw rate that are added throughout.
-    pub(crate) push: [T; 2],
+    steering: &'m [T],
+    window: &'m Window,
+    relaxes: bool,
+    rolls: bool,
+}
+
+/// What is added to the accelerations throughout a sample.
+struct Extra<T> {
+    /// To those of v_y and yaw rate.
+    push: [T; 2],
+    flexible: Option<Push<T>>,
 }
 
 /// The inputs of an instant.
-struct Instant<T> {
+struct Instant<'e, T> {
     v_x_mps: T,
     steering_rad: T,
     a_x_mps2: f64,
@@ -39,9 +48,7 @@ struct Instant<T> {
     minutes: f64,
     lap_share: f64,
     place_rad: f64,
-    /// The sample before it.
-    sample: usize,
-    push: [T; 2],
+    extra: &'e Extra<T>,
 }
 
 /// What an instant leaves behind for the next.
@@ -65,8 +72,35 @@ struct Rates<T> {
     memory: Memory<T>,
 }
 
-impl<T: Real> Mover<'_, '_, T> {
-    pub(crate) fn run(&self, start: [T; 2]) -> Outputs<T> {
+impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
+    /// `steering` begins `run_in` samples before the window.
+    pub(crate) fn new(
+        model: &'m ExtendedModel<'a>,
+        p: &'m [T],
+        car: &'m Car<T>,
+        tires: PacejkaParameters<T>,
+        steering: &'m [T],
+        run_in: usize,
+        window: &'m Window,
+    ) -> Self {
+        let (before, steering) = steering.split_at(run_in);
+        let has = |effect| model.effects.contains(&effect);
+        Self {
+            model,
+            p,
+            car,
+            axles_at_rest: car.axles_at_rest(),
+            tires,
+            before,
+            steering,
+            window,
+            relaxes: has(EffectId::TireRelaxation) && car.relaxation_m.re() >= 0.0,
+            rolls: has(EffectId::RollSteer),
+        }
+    }
+
+    /// The motion from a start, with accelerations of v_y and yaw rate added throughout.
+    pub(crate) fn run(&self, start: [T; 2], push: [T; 2]) -> Outputs<T> {
         let run = &self.model.recording.runs[self.window.segment];
         let n = self.window.len;
         let dt_s = run.dt_s;
@@ -86,12 +120,14 @@ impl<T: Real> Mover<'_, '_, T> {
         let mut x = start;
         let (mut speed, mut heading) = (zero, zero);
         let mut residual = self.model.residual.map(|r| r.stream(run, self.window));
-        let mut push = self.push;
-        let mut rates = self.settled(x, h_s);
+        let mut extra = self.extra(0, push);
+        let mut rates = self.settled(x, h_s, &extra);
         for k in 0..n {
-            if let Some(stream) = &mut residual {
-                push = stream.next(k, [x[0].re(), x[1].re()]).map(T::from);
-            }
+            let push = match &mut residual {
+                Some(stream) => stream.next(k, [x[0].re(), x[1].re()]).map(T::from),
+                None => push,
+            };
+            extra = self.extra(k, push);
             out.v_y_mps.push(x[0]);
             out.yaw_rate_radps.push(x[1]);
             out.yaw_acceleration_radps2.push(rates.yaw_radps2);
@@ -103,22 +139,22 @@ impl<T: Real> Mover<'_, '_, T> {
                 break;
             }
             for i in 0..substeps as usize {
-                let middle = Instant { push, ..self.instant(k, (i as f64 + 0.5) / substeps) };
+                let middle = self.instant(k, (i as f64 + 0.5) / substeps, &extra);
                 let half = [x[0] + rates.v_y_mps2 * (h_s / 2.0), x[1] + rates.yaw_radps2 * (h_s / 2.0)];
-                let there = self.rates(half, &middle, &rates.memory, h_s / 2.0);
+                let there = self.rates(half, &middle, &rates.memory, h_s / 2.0, self.relaxes);
                 x = [x[0] + there.v_y_mps2 * h_s, x[1] + there.yaw_radps2 * h_s];
                 speed += there.v_x_mps2 * h_s;
                 heading += half[1] * h_s;
-                let end = Instant { push, ..self.instant(k, (i as f64 + 1.0) / substeps) };
-                rates = self.rates(x, &end, &rates.memory, h_s);
+                let end = self.instant(k, (i as f64 + 1.0) / substeps, &extra);
+                rates = self.rates(x, &end, &rates.memory, h_s, self.relaxes);
             }
         }
         out
     }
 
     /// Rates at the start, as if the motion had gone on as it does there.
-    fn settled(&self, x: [T; 2], h_s: f64) -> Rates<T> {
-        let now = self.instant(0, 0.0);
+    fn settled(&self, x: [T; 2], h_s: f64, extra: &Extra<T>) -> Rates<T> {
+        let now = self.instant(0, 0.0, extra);
         let zero = T::from(0.0);
         let a_y_mps2 = now.v_x_mps * x[1];
         let mut memory = Memory {
@@ -128,20 +164,19 @@ impl<T: Real> Mover<'_, '_, T> {
             slip_rad: [zero; 2],
             steady_rad: [zero; 2],
         };
-        // Without relaxation the slip is the steady one whatever the memory holds; the front use settles in three turns.
-        let still = Car { relaxation_m: zero, ..self.car };
-        let mut rates = self.rates_of(&still, x, &now, &memory, h_s);
+        // The front use settles in three turns.
+        let mut rates = self.rates(x, &now, &memory, h_s, false);
         for _ in 0..2 {
             memory.front_use = rates.memory.front_use;
-            rates = self.rates_of(&still, x, &now, &memory, h_s);
+            rates = self.rates(x, &now, &memory, h_s, false);
         }
-        if !self.model.effects.contains(&EffectId::TireRelaxation) {
+        if !self.relaxes {
             return rates;
         }
         memory = rates.memory;
         let behind = self.slip_behind();
         memory.slip_rad = [memory.steady_rad[0] + behind[0], memory.steady_rad[1] + behind[1]];
-        self.rates_of(&self.car, x, &now, &memory, 0.0)
+        self.rates(x, &now, &memory, 0.0, true)
     }
 
     /// How far the relaxed slip angles lie from the steady ones when the window starts: the filter run over the measured motion before it.
@@ -161,19 +196,23 @@ impl<T: Real> Mover<'_, '_, T> {
                 steering_rad - ((self.car.l_f_m * r + v_y) / v_x).atan(),
                 -((-(self.car.l_r_m * r) + v_y) / v_x).atan(),
             ];
+            let lag = Lag::new(run.dt_s, self.car.relaxation_m / v_x);
             for axle in 0..2 {
-                slip[axle] = if i == 0 {
-                    now[axle]
-                } else {
-                    lagged(slip[axle], steady[axle], now[axle], run.dt_s, self.car.relaxation_m / v_x)
-                };
+                slip[axle] = if i == 0 { now[axle] } else { lag.step(slip[axle], steady[axle], now[axle]) };
             }
             steady = now;
         }
         [slip[0] - steady[0], slip[1] - steady[1]]
     }
 
-    fn instant(&self, k: usize, share: f64) -> Instant<T> {
+    fn extra(&self, k: usize, push: [T; 2]) -> Extra<T> {
+        let run = &self.model.recording.runs[self.window.segment];
+        let flexible = self.model.flexible.as_ref();
+        let own = || self.model.flexible_parameters(self.p);
+        Extra { push, flexible: flexible.map(|f| f.push(own(), run, self.window.from + k)) }
+    }
+
+    fn instant<'e>(&self, k: usize, share: f64, extra: &'e Extra<T>) -> Instant<'e, T> {
         let run = &self.model.recording.runs[self.window.segment];
         let (a, b) = (self.window.from + k, (self.window.from + k + 1).min(run.len() - 1));
         let next = (k + 1).min(self.steering.len() - 1);
@@ -189,18 +228,20 @@ impl<T: Real> Mover<'_, '_, T> {
             minutes: (run.time_s(a) + share * run.dt_s) / 60.0,
             lap_share: lap[a] + (turn - turn.round()) * share,
             place_rad: run.place_rad[a],
-            sample: a,
-            push: self.push,
+            extra,
         }
     }
 
-    fn rates(&self, x: [T; 2], now: &Instant<T>, memory: &Memory<T>, h_s: f64) -> Rates<T> {
-        self.rates_of(&self.car, x, now, memory, h_s)
-    }
-
-    /// Accelerations `h_s` after an instant that left `memory`.
-    fn rates_of(&self, car: &Car<T>, x: [T; 2], now: &Instant<T>, memory: &Memory<T>, h_s: f64) -> Rates<T> {
-        let model = self.model;
+    /// Accelerations `h_s` after an instant that left `memory`; where nothing `relaxes`, the slip is the steady one whatever the memory holds.
+    fn rates(
+        &self,
+        x: [T; 2],
+        now: &Instant<'_, T>,
+        memory: &Memory<T>,
+        h_s: f64,
+        relaxes: bool,
+    ) -> Rates<T> {
+        let (model, car) = (self.model, self.car);
         let [v_y, r] = x;
         let v_x = if now.v_x_mps.re() < MIN_SPEED_MPS { T::from(MIN_SPEED_MPS) } else { now.v_x_mps };
         let at = Moment {
@@ -216,7 +257,7 @@ impl<T: Real> Mover<'_, '_, T> {
             lap_m: model.recording.laps.lap_m,
             place_rad: now.place_rad,
         };
-        let mut axles = car.axles_at_rest();
+        let mut axles = self.axles_at_rest;
         for (effect, values) in model.with_parameters(self.p) {
             effect.loads(values, car, &at, &mut axles);
         }
@@ -229,15 +270,13 @@ impl<T: Real> Mover<'_, '_, T> {
             axles.rear.steer_rad - ((v_y - r * car.l_r_m) / v_x).atan(),
         ];
         let mut slip_rad = steady_rad;
-        if model.effects.contains(&EffectId::TireRelaxation) && car.relaxation_m.re() >= 0.0 {
-            let tau_s = car.relaxation_m / v_x;
-            for i in 0..2 {
-                slip_rad[i] = if h_s > 0.0 {
-                    lagged(memory.slip_rad[i], memory.steady_rad[i], steady_rad[i], h_s, tau_s)
-                } else {
-                    memory.slip_rad[i]
-                };
+        if relaxes && h_s > 0.0 {
+            let lag = Lag::new(h_s, car.relaxation_m / v_x);
+            for (i, slip) in slip_rad.iter_mut().enumerate() {
+                *slip = lag.step(memory.slip_rad[i], memory.steady_rad[i], steady_rad[i]);
             }
+        } else if relaxes {
+            slip_rad = memory.slip_rad;
         }
         let force = |axle: &Axle<T>, tire: &gripsight_vehicle::MagicFormula<T>, slip: T| {
             tire.normalized_force(slip / axle.grip) * axle.grip * axle.usable
@@ -259,19 +298,22 @@ impl<T: Real> Mover<'_, '_, T> {
             0.0
         };
         let front_y_n = if commanded { front_n * cos + sin * front_x_n } else { front_n * cos };
-        let mut a_y = (rear_n + front_y_n) / car.mass_kg + motion.force_y_mps2 + now.push[0];
+        let mut a_y = (rear_n + front_y_n) / car.mass_kg + motion.force_y_mps2 + now.extra.push[0];
         let mut yaw_radps2 = (front_y_n * car.l_f_m - rear_n * car.l_r_m) / car.yaw_inertia_kgm2
             + motion.yaw_radps2
-            + now.push[1];
+            + now.extra.push[1];
         if let Some(flexible) = &model.flexible {
             let own = model.flexible_parameters(self.p);
             let rate = |i: usize| {
                 if h_s > 0.0 { (steady_rad[i] - memory.steady_rad[i]) / h_s } else { T::from(0.0) }
             };
             let [more_y, more_yaw] = flexible.forces(own, &at, steady_rad, [rate(0), rate(1)]);
-            let push = flexible.push(own, &model.recording.runs[self.window.segment], now.sample);
-            a_y += more_y + push.force_y_mps2;
-            yaw_radps2 += more_yaw + push.yaw_radps2;
+            a_y += more_y;
+            yaw_radps2 += more_yaw;
+        }
+        if let Some(push) = &now.extra.flexible {
+            a_y += push.force_y_mps2;
+            yaw_radps2 += push.yaw_radps2;
             motion.force_x_mps2 += push.force_x_mps2;
             motion.gravity_x_mps2 += push.gravity_x_mps2;
             motion.gravity_y_mps2 += push.gravity_y_mps2;
@@ -281,8 +323,8 @@ impl<T: Real> Mover<'_, '_, T> {
         } else {
             T::from(now.a_x_mps2)
         };
-        let rolled = if h_s > 0.0 {
-            lagged(memory.rolled_a_y_mps2, memory.a_y_mps2, a_y, h_s, T::from(ROLL_TIME_S))
+        let rolled = if self.rolls && h_s > 0.0 {
+            Lag::new(h_s, T::from(ROLL_TIME_S)).step(memory.rolled_a_y_mps2, memory.a_y_mps2, a_y)
         } else {
             memory.rolled_a_y_mps2
         };

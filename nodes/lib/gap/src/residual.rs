@@ -52,8 +52,8 @@ impl Residual {
         let lessons = Lessons::of(engine, base, windows);
         let validation = of_length(engine.recording, &windows.of_blocks(is_validation), HORIZON_S);
         let mut best: Option<(f64, Self)> = None;
-        for predicted in [false, true] {
-            let network = lessons.teach(predicted).ok()?;
+        let (measured, predicted) = rayon::join(|| lessons.teach(false), || lessons.teach(true));
+        for network in [measured.ok()?, predicted.ok()?] {
             for share in SHARES {
                 let residual = Self { network: network.clone(), share };
                 let model = ExtendedModel { residual: Some(&residual), ..engine.model(&base.effects, None) };

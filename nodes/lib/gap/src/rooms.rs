@@ -16,16 +16,11 @@ fn by_noise<'a>(engine: &Engine<'a>) -> Engine<'a> {
     Engine { sigma: engine.recording.weights.clone(), ..engine.clone() }
 }
 
-fn cost(engine: &Engine<'_>, state: &State, windows: &Windows) -> f64 {
-    let now = engine.fit(&state.named, &state.parameters, Some(state.starts.clone()), windows, 0);
-    now.cost / now.residuals()
-}
-
 /// How much lower the cost per residual is for each effect of a state, beside the others.
 pub(crate) fn explained(engine: &Engine<'_>, state: &State, windows: &Windows) -> Vec<f64> {
     let engine = &by_noise(engine);
-    let with = cost(engine, state, windows);
-    let less = |effect: &EffectId| cost(engine, &without(engine, state, *effect, windows), windows) - with;
+    let with = engine.cost(state, windows);
+    let less = |effect: &EffectId| engine.cost(&without(engine, state, *effect, windows), windows) - with;
     state.named.iter().map(less).collect()
 }
 
@@ -73,7 +68,7 @@ impl Left {
             let flexible = Flexible::new(engine.recording, slip_rad, engine.vehicle.wheelbase_m(), &[room]);
             (room, gain(engine, state, windows, &flexible))
         };
-        Self { cost: cost(engine, state, windows), gains: Room::ALL.into_iter().map(gain).collect() }
+        Self { cost: engine.cost(state, windows), gains: Room::ALL.into_iter().map(gain).collect() }
     }
 
     /// The same on the calm part of the windows.
@@ -88,7 +83,7 @@ impl Left {
         };
         let state = State { starts: kept.iter().map(|&k| state.starts[k]).collect(), ..state.clone() };
         let left = Self::by(engine, &state, &calm, slip_rad);
-        Self { cost: now.cost / now.residuals(), ..left }
+        Self { cost: now.cost / now.residuals, ..left }
     }
 
     /// The most that a room explains, but for what it explains in any drive.

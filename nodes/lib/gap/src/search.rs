@@ -36,7 +36,7 @@ pub(crate) fn search(
     let mut library = library.to_vec();
     let mut state = null.clone();
     let mut evidence: Vec<Round> = Vec::new();
-    let mut costs = vec![null.cost / null.residuals()];
+    let mut costs = vec![null.cost / null.residuals];
     let mut number = 0;
     let last = loop {
         number += 1;
@@ -44,7 +44,7 @@ pub(crate) fn search(
         let here = round(engine, &state, &library, windows, state.named.len());
         let room = state.named.len() < thresholds::MOST_EFFECTS && number < ROUNDS;
         let Some(next) = here.winner().filter(|_| here.taken && room).map(|r| r.state.clone()) else {
-            break here;
+            break completed(engine, here, windows);
         };
         evidence.push(here);
         state = settled(engine, &next, windows);
@@ -57,7 +57,7 @@ pub(crate) fn search(
             library.retain(|e| *e != delay);
         }
         drop_needless(engine, &mut state, &mut evidence, windows);
-        costs.push(state.cost / state.residuals());
+        costs.push(state.cost / state.residuals);
     };
     let mut found = Found { state, evidence, last, costs };
     if found.state.named.len() > 1 {
@@ -65,6 +65,14 @@ pub(crate) fn search(
         found.challenge(engine, &library, windows);
     }
     found
+}
+
+/// With the sizes of its candidates told: looks at the problem around those that were not fitted to the end.
+fn completed(engine: &Engine<'_>, mut round: Round, windows: &Windows) -> Round {
+    for state in round.refits.iter_mut().map(|r| &mut r.state).filter(|s| s.fit.is_none()) {
+        *state = engine.fit(&state.named, &state.parameters, Some(state.starts.clone()), windows, 0);
+    }
+    round
 }
 
 fn settled(engine: &mut Engine<'_>, state: &State, windows: &Windows) -> State {

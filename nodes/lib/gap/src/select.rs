@@ -183,7 +183,7 @@ fn first_look(
         .iter()
         .map(|own| {
             let values: Vec<f64> = carried[..before].iter().chain(own).copied().collect();
-            engine.fit(&named, &values, Some(state.starts.clone()), windows, steps)
+            engine.look(&named, &values, Some(state.starts.clone()), windows, steps)
         })
         .filter(|s| s.finite)
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
@@ -234,14 +234,9 @@ fn patch_starts(engine: &Engine<'_>, state: &State, windows: &Windows) -> Vec<Ve
             let start = i as f64 / PLACES as f64;
             let mut values = state.parameters.clone();
             values.extend([0.0, start, length]);
-            let here = engine.linearize(&effects, &effects, &values, &state.starts, windows);
-            let parameters = engine.parameters(&effects, &effects, &values, 1.0);
-            let free: Vec<usize> = (0..values.len()).filter(|&j| parameters[j].free).collect();
-            let row = free.iter().position(|&j| j == state.parameters.len());
-            let gain = row.map_or(0.0, |r| {
-                let g = here.gradient[r];
-                if g < 0.0 { g * g / here.information[(r, r)].max(1e-9) } else { 0.0 }
-            });
+            let depth = state.parameters.len();
+            let (gradient, information) = engine.slope(&effects, &values, depth, &state.starts, windows);
+            let gain = if gradient < 0.0 { gradient * gradient / information.max(1e-9) } else { 0.0 };
             (gain, start)
         })
         .collect();
@@ -288,7 +283,7 @@ pub(crate) fn round(
     if let Some(best) = refits.first() {
         // The model without the effect may have been stuck where the winner is not.
         let values = engine.carry(&best.state, &state.named);
-        let again = engine.fit(&state.named, &values, Some(best.state.starts.clone()), windows, 10);
+        let again = engine.look(&state.named, &values, Some(best.state.starts.clone()), windows, 10);
         if again.finite && again.cost < before.cost {
             before = again;
         }
@@ -350,7 +345,7 @@ fn prefer_simple(refits: &mut [Refit]) {
 
 /// Whether a model is still needed beside a simpler one.
 pub(crate) fn needed(simpler: &State, state: &State) -> bool {
-    let residuals = state.residuals();
+    let residuals = state.residuals;
     let loss = simpler.cost - state.cost;
     let remaining = (simpler.cost - thresholds::NOISE_COST * residuals).max(0.05 * simpler.cost);
     loss > thresholds::LEAST_GAIN * residuals && loss > thresholds::LEAST_SHARE[1] * remaining
@@ -363,7 +358,7 @@ fn acceptable(engine: &Engine<'_>, r: &Refit, before: &State, number: usize) -> 
         _ if r.effect.is_of_a_place() => thresholds::LEAST_PLACE_SIZE,
         _ => thresholds::LEAST_SIZE,
     };
-    let residuals = before.residuals();
+    let residuals = before.residuals;
     let remaining = (before.cost - thresholds::NOISE_COST * residuals).max(0.05 * before.cost);
     let least_z = if r.effect.is_of_a_place() { thresholds::LEAST_PLACE_Z } else { thresholds::LEAST_Z };
     r.z > least_z

@@ -175,13 +175,28 @@ pub struct Outputs<T> {
 /// A first-order lag over a step in which its input is linear: exact, and at `tau_s` = 0 exactly the input, with the right derivative.
 ///
 /// tau y' + y = u,  u = u0 + s t:  y(h) = u1 - s tau + (y0 - u0 + s tau) exp(-h/tau)
-pub(crate) fn lagged<T: Real>(y0: T, u0: T, u1: T, h_s: f64, tau_s: T) -> T {
-    let ramp = (u1 - u0) / h_s * tau_s;
-    let settled = u1 - ramp;
-    if tau_s.re() < h_s / 30.0 {
-        settled
-    } else {
-        settled + (y0 - u0 + ramp) * (-(tau_s.recip() * h_s)).exp()
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lag<T> {
+    h_s: f64,
+    tau_s: T,
+    /// exp(-h/tau); nothing where it is nil.
+    decay: Option<T>,
+}
+
+impl<T: Real> Lag<T> {
+    pub(crate) fn new(h_s: f64, tau_s: T) -> Self {
+        let slow = tau_s.re() >= h_s / 30.0;
+        Self { h_s, tau_s, decay: slow.then(|| (-(tau_s.recip() * h_s)).exp()) }
+    }
+
+    /// The output after a step in which the input goes from `u0` to `u1`.
+    pub(crate) fn step(&self, y0: T, u0: T, u1: T) -> T {
+        let ramp = (u1 - u0) / self.h_s * self.tau_s;
+        let settled = u1 - ramp;
+        match self.decay {
+            Some(decay) => settled + (y0 - u0 + ramp) * decay,
+            None => settled,
+        }
     }
 }
 

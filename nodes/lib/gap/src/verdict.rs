@@ -179,14 +179,14 @@ pub(crate) fn looks(engine: &Engine<'_>, evidence: &[Round], last: &Round, state
         .zip(evidence.iter().chain([last]))
         .map(|(about, round)| Look {
             about: about.map(EffectId::name),
-            cost: round.before.cost / round.before.residuals(),
+            cost: round.before.cost / round.before.residuals,
             compared: round
                 .refits
                 .iter()
                 .zip(&round.lead_z)
                 .map(|(r, &behind_z)| Comparison {
                     name: r.effect.name(),
-                    gain: r.gain / round.before.residuals(),
+                    gain: r.gain / round.before.residuals,
                     z: r.z,
                     behind_z,
                     alike: round.winner().map_or(0.0, |w| round.screening.cosine(w.effect, r.effect)),

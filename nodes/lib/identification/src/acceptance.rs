@@ -183,7 +183,10 @@ fn peaks(run: &Identification, outcome: &Outcome, shape: &[String], verdict: &mu
         if from_prior {
             let bent: Vec<_> = shape.iter().filter(|name| name.starts_with(axle)).cloned().collect();
             if bent.is_empty() {
-                remarks.push(format!("{what}; D = {value:.2} is the prior's"));
+                let mu = run.prior.map_or(f64::NAN, |p| p.mu);
+                remarks.push(format!(
+                    "{what}; D = {value:.2} is the prior's {mu:.2}, moved as far as data and its sigma say"
+                ));
             } else {
                 // Refuses 19 of 112 development draws (5000-5119) with a prior 0.4 too high, and 3 with the right one.
                 against.push(format!(

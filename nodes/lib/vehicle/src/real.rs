@@ -135,6 +135,19 @@ impl<const N: usize> Dual<N> {
     pub fn derivatives(&self) -> &[f64; N] {
         &self.derivatives
     }
+
+    /// Derivatives of a function of two numbers, of which this is the first, from those by each. Those by a constant may be infinite.
+    #[inline]
+    fn combine(&mut self, by_self: f64, by_other: f64, other: &Self) {
+        let pairs = self.derivatives.iter_mut().zip(&other.derivatives);
+        match (self.varies, other.varies) {
+            (true, true) => pairs.for_each(|(d, o)| *d = by_self * *d + by_other * o),
+            (true, false) => pairs.for_each(|(d, _)| *d *= by_self),
+            (false, true) => pairs.for_each(|(d, o)| *d = by_other * o),
+            (false, false) => {}
+        }
+        self.varies |= other.varies;
+    }
 }
 
 impl<const N: usize> From<f64> for Dual<N> {
@@ -153,12 +166,16 @@ impl<const N: usize> Real for Dual<N> {
     #[inline]
     fn chain<const K: usize>(value: f64, arguments: [(f64, &Self); K]) -> Self {
         let mut out = Self::from(value);
-        for (factor, argument) in arguments {
-            if argument.varies {
-                out.varies = true;
-                for (d, a) in out.derivatives.iter_mut().zip(&argument.derivatives) {
-                    *d += factor * a;
+        out.varies = arguments.iter().any(|(_, argument)| argument.varies);
+        if out.varies {
+            // The factor of a constant may be infinite.
+            let factors = arguments.map(|(factor, argument)| if argument.varies { factor } else { 0.0 });
+            for lane in 0..N {
+                let mut sum = 0.0;
+                for k in 0..K {
+                    sum += factors[k] * arguments[k].1.derivatives[lane];
                 }
+                out.derivatives[lane] = sum;
             }
         }
         out
@@ -169,8 +186,10 @@ impl<const N: usize> Neg for Dual<N> {
     type Output = Self;
 
     #[inline]
-    fn neg(self) -> Self {
-        Self::chain(-self.re, [(-1.0, &self)])
+    fn neg(mut self) -> Self {
+        self.re = -self.re;
+        self.derivatives.iter_mut().for_each(|d| *d = -*d);
+        self
     }
 }
 
@@ -198,8 +217,9 @@ impl<const N: usize> Mul for Dual<N> {
     type Output = Self;
 
     #[inline]
-    fn mul(self, other: Self) -> Self {
-        Self::chain(self.re * other.re, [(other.re, &self), (self.re, &other)])
+    fn mul(mut self, other: Self) -> Self {
+        self *= other;
+        self
     }
 }
 
@@ -207,9 +227,11 @@ impl<const N: usize> Div for Dual<N> {
     type Output = Self;
 
     #[inline]
-    fn div(self, other: Self) -> Self {
+    fn div(mut self, other: Self) -> Self {
         let value = self.re / other.re;
-        Self::chain(value, [(1.0 / other.re, &self), (-value / other.re, &other)])
+        self.combine(1.0 / other.re, -value / other.re, &other);
+        self.re = value;
+        self
     }
 }
 
@@ -285,7 +307,8 @@ impl<const N: usize> SubAssign for Dual<N> {
 impl<const N: usize> MulAssign for Dual<N> {
     #[inline]
     fn mul_assign(&mut self, other: Self) {
-        *self = *self * other;
+        self.combine(other.re, self.re, &other);
+        self.re *= other.re;
     }
 }
 

@@ -3,7 +3,7 @@
 use gripsight_vehicle::{GRAVITY_MPS2, Real};
 
 use super::{Effect, EffectSpec, Need, both_sides, positive, spec};
-use crate::terms::{Car, Outputs, delayed, lagged};
+use crate::terms::{Car, Lag, Outputs, delayed};
 
 const ACCELEROMETER: &[Need] = &[Need::Accelerometer];
 
@@ -128,9 +128,10 @@ impl Effect for OdometryLowPass {
         let [first, second, ..] = out.v_y_mps[..] else { return };
         // Before the window the input is taken as a ramp that goes on.
         let slope = (second - first) / out.dt_s;
+        let lag = Lag::new(out.dt_s, p[0]);
         let (mut before, mut y) = (first, first - slope * p[0]);
         for v in out.v_y_mps.iter_mut().skip(1) {
-            y = lagged(y, before, *v, out.dt_s, p[0]);
+            y = lag.step(y, before, *v);
             before = *v;
             *v = y;
         }

@@ -24,6 +24,14 @@ pub struct Linearization {
     pub(super) eliminations: Vec<Elimination>,
 }
 
+impl Linearization {
+    /// The objective alone.
+    #[must_use]
+    pub fn evaluation(&self) -> Evaluation {
+        Evaluation { cost: self.cost, window_costs: self.window_costs.clone(), residuals: self.residuals }
+    }
+}
+
 /// How the start of a window follows a step of the parameters: dx = -(offset + slope dtheta).
 #[derive(Debug, Clone)]
 pub(super) struct Elimination {
@@ -99,30 +107,51 @@ pub fn linearize<M: Rollout>(
     sum
 }
 
-/// The cost alone.
-pub(super) fn cost<M: Rollout>(problem: &Problem<'_, M>, parameters: &[f64], starts: &[[f64; 2]]) -> f64 {
-    let windows: f64 = problem
+/// The objective at a point, without derivatives.
+#[derive(Debug, Clone, Default)]
+pub struct Evaluation {
+    /// The objective.
+    pub cost: f64,
+    /// The share of every window in it.
+    pub window_costs: Vec<f64>,
+    /// Residuals that count.
+    pub residuals: usize,
+}
+
+/// Evaluates the objective at given parameters (all of the model's) and start states (one a window).
+#[must_use]
+pub fn evaluate<M: Rollout>(
+    problem: &Problem<'_, M>,
+    parameters: &[f64],
+    starts: &[[f64; 2]],
+) -> Evaluation {
+    let windows: Vec<(f64, usize)> = problem
         .windows
         .par_iter()
         .zip(starts)
-        .map(|(window, start)| {
-            let (mut predicted, mut measured) = (Vec::new(), Vec::new());
-            problem.model.rollout(parameters, *start, window, &mut predicted);
-            problem.model.measured(window, &mut measured);
-            let scaled = residuals(problem, &measured, &predicted);
-            let (square, n) = scaled.fold((0.0, 0), |(s, n), (_, r)| (s + r * r, n + 1));
-            loss(square, n, problem.robust_k).0
-        })
-        .collect::<Vec<_>>()
-        .iter()
-        .sum();
+        .map_init(
+            || (Vec::new(), Vec::new()),
+            |(predicted, measured), (window, start)| {
+                problem.model.rollout(parameters, *start, window, predicted);
+                problem.model.measured(window, measured);
+                let scaled = residuals(problem, measured, predicted);
+                let (square, n) = scaled.fold((0.0, 0), |(s, n), (_, r)| (s + r * r, n + 1));
+                (loss(square, n, problem.robust_k).0, n)
+            },
+        )
+        .collect();
     let priors: f64 = problem
         .parameters
         .iter()
         .zip(parameters)
         .filter_map(|(p, v)| p.prior.filter(|_| p.free).map(|prior| ((v - prior.mean) / prior.sigma).powi(2)))
         .sum();
-    windows + priors
+    let window_costs: Vec<f64> = windows.iter().map(|w| w.0).collect();
+    Evaluation {
+        cost: window_costs.iter().sum::<f64>() + priors,
+        window_costs,
+        residuals: windows.iter().map(|w| w.1).sum(),
+    }
 }
 
 /// The residuals that are measured, with their place.

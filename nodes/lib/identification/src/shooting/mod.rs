@@ -19,8 +19,8 @@ mod solve;
 
 use gripsight_vehicle::Real;
 
-pub use linearize::{Linearization, linearize};
-pub use solve::{Fit, StopReason, fit};
+pub use linearize::{Evaluation, Linearization, evaluate, linearize};
+pub use solve::{Descent, Fit, StopReason, descend, fit};
 
 /// A stretch of samples of one segment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,8 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::linearize::{cost, linearize};
-use super::{Linearization, Problem, Rollout};
+use super::{Evaluation, Linearization, Problem, Rollout, evaluate, linearize};
 
 /// Why a fit ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -103,36 +102,28 @@ const CLUSTERS: usize = 40;
 /// Relative change of the cost under which a fit has converged.
 const TOLERANCE: f64 = 1e-6;
 
+/// Where a descent has come to.
+#[derive(Debug, Clone)]
+pub struct Descent {
+    /// All parameters of the model.
+    pub parameters: Vec<f64>,
+    /// Start state of every window.
+    pub starts: Vec<[f64; 2]>,
+    /// The objective there.
+    pub at: Evaluation,
+    /// Why it ended.
+    pub stop: StopReason,
+    /// Steps taken.
+    pub iterations: usize,
+}
+
 /// Fits the free parameters of a problem, from its start values and the given start states (else the model's guesses).
 #[must_use]
 pub fn fit<M: Rollout>(problem: &Problem<'_, M>, starts: Option<Vec<[f64; 2]>>) -> Fit {
     let free = problem.free();
-    let mut parameters: Vec<f64> = problem.parameters.iter().map(|p| p.start.clamp(p.low, p.high)).collect();
-    let mut starts =
-        starts.unwrap_or_else(|| problem.windows.iter().map(|w| problem.model.start_guess(w)).collect());
-    let mut here = linearize(problem, &parameters, &starts);
-    let mut damping = 1e-3;
-    let mut stop = StopReason::MaxIterations;
-    let mut iterations = 0;
-    if !here.cost.is_finite() {
-        stop = StopReason::NotFinite;
-    }
-    while stop == StopReason::MaxIterations && iterations < problem.max_iterations {
-        iterations += 1;
-        let Some((trial, trial_starts, trial_cost)) =
-            descend(problem, &free, &parameters, &starts, &here, &mut damping)
-        else {
-            stop = StopReason::NoDescent;
-            break;
-        };
-        let change = (here.cost - trial_cost) / here.cost.max(f64::MIN_POSITIVE);
-        parameters = trial;
-        starts = trial_starts;
-        here = linearize(problem, &parameters, &starts);
-        if change < TOLERANCE {
-            stop = StopReason::Converged;
-        }
-    }
+    let (end, around) = run(problem, &free, starts);
+    let Descent { parameters, starts, stop, iterations, .. } = end;
+    let linearization = around.unwrap_or_else(|| linearize(problem, &parameters, &starts));
     let on_bound = free
         .iter()
         .copied()
@@ -142,20 +133,61 @@ pub fn fit<M: Rollout>(problem: &Problem<'_, M>, starts: Option<Vec<[f64; 2]>>) 
             parameters[j] <= p.low + margin || parameters[j] >= p.high - margin
         })
         .collect();
-    Fit { parameters, starts, linearization: here, on_bound, stop, iterations, free }
+    Fit { parameters, starts, linearization, on_bound, stop, iterations, free }
 }
 
-type Trial = (Vec<f64>, Vec<[f64; 2]>, f64);
+/// [`fit`] without the derivatives at its end, where only the values are wanted.
+#[must_use]
+pub fn descend<M: Rollout>(problem: &Problem<'_, M>, starts: Option<Vec<[f64; 2]>>) -> Descent {
+    run(problem, &problem.free(), starts).0
+}
+
+/// Descends; with the problem around the end where it is known.
+fn run<M: Rollout>(
+    problem: &Problem<'_, M>,
+    free: &[usize],
+    starts: Option<Vec<[f64; 2]>>,
+) -> (Descent, Option<Linearization>) {
+    let mut parameters: Vec<f64> = problem.parameters.iter().map(|p| p.start.clamp(p.low, p.high)).collect();
+    let mut starts =
+        starts.unwrap_or_else(|| problem.windows.iter().map(|w| problem.model.start_guess(w)).collect());
+    let mut here = linearize(problem, &parameters, &starts);
+    let mut damping = 1e-3;
+    let mut iterations = 0;
+    let ended = |here: Linearization, parameters, starts, stop, iterations| {
+        let at = here.evaluation();
+        (Descent { parameters, starts, at, stop, iterations }, Some(here))
+    };
+    if !here.cost.is_finite() {
+        return ended(here, parameters, starts, StopReason::NotFinite, iterations);
+    }
+    while iterations < problem.max_iterations {
+        iterations += 1;
+        let Some((trial, trial_starts, at)) = step(problem, free, &parameters, &starts, &here, &mut damping)
+        else {
+            return ended(here, parameters, starts, StopReason::NoDescent, iterations);
+        };
+        let change = (here.cost - at.cost) / here.cost.max(f64::MIN_POSITIVE);
+        (parameters, starts) = (trial, trial_starts);
+        let converged = change < TOLERANCE;
+        if converged || iterations == problem.max_iterations {
+            let stop = if converged { StopReason::Converged } else { StopReason::MaxIterations };
+            return (Descent { parameters, starts, at, stop, iterations }, None);
+        }
+        here = linearize(problem, &parameters, &starts);
+    }
+    ended(here, parameters, starts, StopReason::MaxIterations, iterations)
+}
 
 /// Finds a step that lowers the cost, raising the damping until one does.
-fn descend<M: Rollout>(
+fn step<M: Rollout>(
     problem: &Problem<'_, M>,
     free: &[usize],
     parameters: &[f64],
     starts: &[[f64; 2]],
     here: &Linearization,
     damping: &mut f64,
-) -> Option<Trial> {
+) -> Option<(Vec<f64>, Vec<[f64; 2]>, Evaluation)> {
     // A parameter on its bound that would go further out does not take part.
     let pinned: Vec<bool> = free
         .iter()
@@ -188,10 +220,10 @@ fn descend<M: Rollout>(
                     [x[0] - dx[0], x[1] - dx[1]]
                 })
                 .collect();
-            let trial_cost = cost(problem, &trial, &trial_starts);
-            if trial_cost < here.cost {
+            let at = evaluate(problem, &trial, &trial_starts);
+            if at.cost < here.cost {
                 *damping = (*damping * 0.2).max(1e-9);
-                return Some((trial, trial_starts, trial_cost));
+                return Some((trial, trial_starts, at));
             }
         }
         *damping = (*damping * 5.0).max(1e-6);

@@ -132,7 +132,7 @@ fn the_gradient_is_the_derivative_of_the_cost() {
         },
         None,
     );
-    let at = |a: f64| linearize::cost(&problem, &[a, 1.0], &found.starts);
+    let at = |a: f64| evaluate(&problem, &[a, 1.0], &found.starts).cost;
     let here = linearize(&problem, &[20.0, 1.0], &found.starts);
     let numeric = (at(20.001) - at(19.999)) / 0.002;
     approx::assert_relative_eq!(2.0 * here.gradient[0], numeric, max_relative = 1e-4);
