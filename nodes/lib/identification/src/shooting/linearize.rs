@@ -120,11 +120,7 @@ pub struct Evaluation {
 
 /// Evaluates the objective at given parameters (all of the model's) and start states (one a window).
 #[must_use]
-pub fn evaluate<M: Rollout>(
-    problem: &Problem<'_, M>,
-    parameters: &[f64],
-    starts: &[[f64; 2]],
-) -> Evaluation {
+pub fn evaluate<M: Rollout>(problem: &Problem<'_, M>, parameters: &[f64], starts: &[[f64; 2]]) -> Evaluation {
     let windows: Vec<(f64, usize)> = problem
         .windows
         .par_iter()
