@@ -25,7 +25,7 @@ pub(crate) struct Budget {
     pub(crate) floor: Estimate,
     pub(crate) closed: Estimate,
     pub(crate) scored_on: &'static str,
-    /// What the best of the effects that were not taken would close.
+    /// What the effects found but not named, and the best of those that were not found, would close beside the named.
     candidates: Vec<(EffectId, Estimate)>,
 }
 
@@ -36,8 +36,10 @@ pub(crate) struct Models<'m> {
     pub(crate) nominal: &'m Nominal,
     /// Tires retuned.
     pub(crate) null: &'m State,
-    /// With the effects taken.
+    /// With the effects named.
     pub(crate) state: &'m State,
+    /// With all that the search found.
+    pub(crate) found: &'m State,
     /// The last look, in which nothing more was found.
     pub(crate) last: &'m Round,
 }
@@ -81,16 +83,15 @@ impl<'a> Scorer<'a> {
 
 /// Iterations of the fits of the steps between.
 const STEP_ITERATIONS: usize = 10;
-/// How many of the effects that were not taken are scored, and the iterations of their fits.
+/// How many of the effects that were not found are scored.
 const CANDIDATES: usize = 3;
-const CANDIDATE_ITERATIONS: usize = 5;
 /// An interval of a share that is wider says nothing.
 const WIDEST_SHARE: f64 = 2.0;
 
 impl Budget {
     /// Scores the models.
     pub(crate) fn of(engine: &Engine<'_>, scorer: &Scorer<'_>, windows: &Split, models: &Models<'_>) -> Self {
-        let Models { nominal, null, state, last } = *models;
+        let Models { nominal, null, state, found, last } = *models;
         let Scorer { engine: scorer, windows: on, scored_on } = scorer;
         let blocks = |effects: &[EffectId], flexible: Option<&Flexible>, p: &[f64]| {
             by_block(scorer.recording, on, &scorer.score(effects, flexible, p, on))
@@ -106,14 +107,16 @@ impl Budget {
         if !state.named.is_empty() {
             steps.push(blocks(&state.effects, None, &state.parameters));
         }
-        let left = last.refits.iter().filter(|r| !state.named.contains(&r.effect));
-        let candidates = left
-            .take(CANDIDATES)
-            .filter_map(|r| {
-                let (named, values) = (&r.state.named, &r.state.parameters);
-                let from = steps.last()?;
-                let fitted = engine.look(named, values, None, &windows.training, CANDIDATE_ITERATIONS);
-                Some((r.effect, closed(from, &blocks(&fitted.effects, None, &fitted.parameters), &retuned)))
+        let unnamed = found.named.iter().filter(|e| !state.named.contains(e)).map(|&e| (e, found));
+        let others = last.refits.iter().filter(|r| !found.named.contains(&r.effect));
+        let candidates = unnamed
+            .chain(others.take(CANDIDATES).map(|r| (r.effect, &r.state)))
+            .filter_map(|(effect, fitted)| {
+                let named = [&state.named[..], &[effect]].concat();
+                let values = engine.carry(fitted, &named);
+                let alone = engine.look(&named, &values, None, &windows.training, STEP_ITERATIONS);
+                let error = blocks(&alone.effects, None, &alone.parameters);
+                Some((effect, closed(steps.last()?, &error, &retuned)))
             })
             .collect();
         let slip = large_slip_rad(engine, null, &windows.training);
@@ -159,7 +162,7 @@ impl Budget {
         }
     }
 
-    /// What an effect that was not taken would close on top of those that were.
+    /// What an effect that was not named would close beside those that were.
     pub(crate) fn closed_by_candidate(&self, effect: EffectId) -> Estimate {
         self.candidates.iter().find(|c| c.0 == effect).map_or(Estimate::UNKNOWN, |c| c.1)
     }

@@ -147,7 +147,7 @@ fn explain(
         engine.fit(&named, &values, Some(state.starts.clone()), &windows.training, 10)
     };
     progress("scoring on held-out data");
-    let models = Models { nominal: &nominal, null: &null, state: &model, last: &last };
+    let models = Models { nominal: &nominal, null: &null, state: &model, found: &state, last: &last };
     let budget = Budget::of(&engine, &scorer, &windows, &models);
     let (verdict, mut reasons) = decide(&budget, &claims, &remains, &costs);
     reasons.extend(noise::caveat(&recording));
