@@ -184,6 +184,16 @@ fn every_verdict_has_its_sentence() {
 }
 
 #[test]
+fn where_no_effect_is_named_the_page_speaks_of_tires_alone() {
+    let mut d = diagnosis();
+    let spoken = ["What the effects had done to the tires", "tires and effects fitted"];
+    assert!(spoken.iter().all(|words| page(&d).contains(words)));
+    d.effects.iter_mut().for_each(|e| e.accepted = false);
+    let html = page(&d);
+    assert!(html.contains("tires fitted") && !spoken.iter().any(|words| html.contains(words)));
+}
+
+#[test]
 fn the_budget_adds_up() {
     let html = page(&diagnosis());
     for (name, value) in [

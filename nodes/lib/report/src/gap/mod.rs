@@ -38,7 +38,9 @@ pub fn gap_page(input: &GapInput<'_>) -> Result<String, ReportError> {
         @if drawn {
             (section("Front tires", false, &figure(&front, "")?))
             (section("Rear tires", false, &figure(&rear, "")?))
-            (section("What the effects had done to the tires", true, &tables::tires(d)))
+            @if names_effects(d) {
+                (section("What the effects had done to the tires", true, &tables::tires(d)))
+            }
             (section("Lateral velocity, worst seconds", false, &figure(&v_y, "")?))
             (section("Yaw rate, worst seconds", false, &figure(&yaw_rate, "Rollouts start anew from the best state at every window.")?))
             (section("Error over speed and lateral acceleration", false, &html! { (figure(&heat, "")?) (scale) }))
@@ -57,6 +59,11 @@ pub fn gap_page(input: &GapInput<'_>) -> Result<String, ReportError> {
         Verdict::NoneOfThese | Verdict::NotIdentifiable => Tone::Caution,
     };
     Ok(page("Sim-to-real gap", tone, &verdict(d), input.header, &body))
+}
+
+/// Whether the models beside the nominal one hold an effect.
+fn names_effects(d: &Diagnosis) -> bool {
+    d.effects.iter().any(|e| e.accepted)
 }
 
 /// The first line.

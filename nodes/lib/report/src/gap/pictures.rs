@@ -21,14 +21,22 @@ pub(super) fn tire_curves(d: &Diagnosis) -> [Chart; 2] {
             name: name.into(),
             points: points.iter().map(|p| (p[0].to_degrees(), p[column])).collect(),
         };
-        let with_effects = d.effects.iter().any(|e| e.accepted);
         let chart = Chart::new(title, Axis::new("slip angle / °").with_range(0.0, end_deg), force_axis())
             .sized(460, 230)
             .with(Layer::Unvisited { name: "slip not driven".into(), from: driven_deg, to: end_deg })
             .with(line(Role::Nominal, "fitted without effects", 1));
-        if with_effects { chart.with(line(Role::Identified, "with the effects named", 2)) } else { chart }
+        if super::names_effects(d) {
+            chart.with(line(Role::Identified, "with the effects named", 2))
+        } else {
+            chart
+        }
     };
     [axle("front tires", 0), axle("rear tires", 1)]
+}
+
+/// What the fitted model holds.
+fn fitted(d: &Diagnosis) -> &'static str {
+    if super::names_effects(d) { "tires and effects fitted" } else { "tires fitted" }
 }
 
 fn force_axis() -> Axis {
@@ -47,7 +55,7 @@ pub(super) fn worst_seconds(d: &Diagnosis) -> [Chart; 2] {
             .sized(460, 220)
             .with(line(Role::Nominal, "model as it came", 1))
             .with(line(Role::Measured, "measured", 0))
-            .with(line(Role::Identified, "with the effects", 2))
+            .with(line(Role::Identified, fitted(d), 2))
     };
     [
         picture("lateral velocity", "v_y / (m/s)", |p| p.v_y_mps),
@@ -125,7 +133,7 @@ pub(super) fn horizon(d: &Diagnosis) -> Chart {
     )
     .sized(460, 230)
     .with(line(Role::Nominal, "model as it came", 1))
-    .with(line(Role::Identified, "tires and effects fitted", 3))
+    .with(line(Role::Identified, fitted(d), 3))
     .with(Layer::Level { role: Role::Measured, name: "noise".into(), y: 1.0 })
 }
 
