@@ -88,7 +88,7 @@ fn every_message_arrives_at_ten_times_the_speed() {
     };
     let drives = listen("/car/drive", DRIVE, "1000");
     let tires = listen("/pacejka", "gripsight_msgs/msg/PacejkaParams", "1");
-    let clock = listen("/clock", "rosgraph_msgs/msg/Clock", "50");
+    let clock = listen("/clock", "rosgraph_msgs/msg/Clock", "90");
     let mut player = play(&domain, &bag, &["-p", "rate:=10.0", "-r", "/drive:=/car/drive"]);
     player.wait_for_log("subscribers are there", PATIENCE);
     let started = Instant::now();
@@ -96,10 +96,10 @@ fn every_message_arrives_at_ten_times_the_speed() {
         assert_eq!(message::<AckermannDriveStamped>(&drives), drive(index));
     }
     let elapsed_s = started.elapsed().as_secs_f64();
-    assert!((0.8..9.0).contains(&elapsed_s), "9.99 s of bag took {elapsed_s} s");
+    assert!((0.8..4.0).contains(&elapsed_s), "9.99 s of bag took {elapsed_s} s");
     assert_eq!(message::<PacejkaParams>(&tires), samples::pacejka(1));
     let mut last = Time::default();
-    for _ in 0..50 {
+    for _ in 0..90 {
         let Clock { clock: now } = message(&clock);
         assert!(
             (now.sec, now.nanosec) >= (last.sec, last.nanosec)
