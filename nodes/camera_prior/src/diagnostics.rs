@@ -79,6 +79,7 @@ mod tests {
             probability: vec![0.2; 5],
             entropy: 0.3,
             energy: -2.0,
+            unfamiliarity: Some(0.7),
             quality: None,
             distance_m: 3.0,
             pictures: 4,

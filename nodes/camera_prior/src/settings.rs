@@ -126,6 +126,13 @@ pub(crate) fn declare(node: &mut Node) -> anyhow::Result<Configuration> {
                 -1e3,
                 1e3,
             )?,
+            most_unfamiliarity: number(
+                "most_unfamiliarity",
+                doubt.most_unfamiliarity,
+                "Largest distance from the network's training pictures that is believed",
+                0.0,
+                1e6,
+            )?,
         },
         filter: FilterSettings {
             length_m: number(

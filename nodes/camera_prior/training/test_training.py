@@ -9,6 +9,7 @@ import refit
 import train
 from data import Rscd, finer, plain, rscd_class, to_tensor
 from export import averaged
+from familiar import LAYERS, Familiar
 from model import build, flops, load_weights
 from noise import Bank
 from render import render
@@ -111,3 +112,17 @@ def test_a_refit_s_halves_are_the_whole_network_and_its_cache_is_found_again(tmp
     assert road.tolist() == [True, False] * 3 and np.allclose(target.sum(1), 1)
     again = refit.answers(None, None, 6, "made", tmp_path, chunk=3)
     assert all((a == b).all() for a, b in zip(again, (x, target, road)))
+
+
+@pytest.mark.parametrize("backbone", LAYERS)
+def test_the_distance_is_small_for_pictures_like_those_of_the_fit_and_large_for_others(backbone):
+    roads = torch.stack([to_tensor(render(np.random.default_rng(i), BANK, 64)[0]) for i in range(120)])
+    net = build(backbone).eval()
+    familiar = Familiar(net, LAYERS[backbone]).fit([roads[:50], roads[50:]])
+    with torch.no_grad():
+        logits, like = familiar(roads)
+        lines = roads.clone()
+        lines[:, :, ::2] += 4.0
+        assert torch.equal(logits, net(roads))
+        assert 0.3 < like.mean() < 1.0
+        assert familiar(lines)[1].min() > like.max()

@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     pictures(&folder, &mut found)?;
     found.sort();
     println!(
-        "family,file,reason,mu,sigma,entropy,energy,mean,dark,saturated,noise,structure,p_dry,p_wet,p_water,p_snow,p_ice"
+        "family,file,reason,mu,sigma,entropy,energy,mean,dark,saturated,noise,structure,p_dry,p_wet,p_water,p_snow,p_ice,unfamiliarity"
     );
     for path in found {
         let bytes = std::fs::read(&path)?;
@@ -47,7 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let q = e.quality.unwrap_or_default();
         let p: Vec<String> = e.probability.iter().map(|p| format!("{p:.4}")).collect();
         println!(
-            "{family},{},{},{:.4},{:.4},{:.4},{:.3},{:.1},{:.3},{:.3},{:.2},{:.3},{}",
+            "{family},{},{},{:.4},{:.4},{:.4},{:.3},{:.1},{:.3},{:.3},{:.2},{:.3},{},{}",
             text(path.file_name()),
             e.reason.map_or("", |r| r.as_str()),
             e.mu,
@@ -59,7 +59,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             q.saturated,
             q.noise,
             q.structure,
-            p.join(",")
+            p.join(","),
+            e.unfamiliarity.map(|d| format!("{d:.3}")).unwrap_or_default()
         );
     }
     Ok(())

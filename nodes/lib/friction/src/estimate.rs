@@ -30,7 +30,7 @@ pub enum Reason {
     Blurred,
     /// The network cannot decide: it holds every state possible.
     Undecided,
-    /// Unlike the pictures trained on: the energy of the logits is too high.
+    /// Unlike the pictures trained on: the energy of the logits or the distance that the network tells is too high.
     Unfamiliar,
     /// The engine failed.
     NetworkFailed,
@@ -100,6 +100,8 @@ pub struct Estimate {
     pub entropy: f64,
     /// Energy of the newest picture's logits, -ln sum exp z; zero where the network was not asked.
     pub energy: f64,
+    /// How unlike the training pictures the newest picture is, see [`Answer::unfamiliarity`](crate::Answer::unfamiliarity).
+    pub unfamiliarity: Option<f64>,
     /// Statistics of the newest picture's region of interest.
     pub quality: Option<QualityStatistics>,
     /// Distance that the average spans, metres.

@@ -5,7 +5,7 @@ use crate::decode::decode;
 use crate::error::FrictionError;
 use crate::estimate::{Estimate, Reason, Source};
 use crate::filter::DistanceFilter;
-use crate::network::Network;
+use crate::network::{Answer, Network};
 use crate::picture::{Frame, RgbPicture};
 use crate::quality::QualityStatistics;
 use crate::settings::Settings;
@@ -41,6 +41,7 @@ struct Reading {
     p: Vec<f64>,
     entropy: f64,
     energy: f64,
+    unfamiliarity: Option<f64>,
     quality: QualityStatistics,
     refused: Option<Reason>,
 }
@@ -108,6 +109,7 @@ impl FrictionEstimator {
         let seen = |mut estimate: Estimate| {
             estimate.entropy = reading.entropy;
             estimate.energy = reading.energy;
+            estimate.unfamiliarity = reading.unfamiliarity;
             estimate.quality = Some(reading.quality);
             estimate
         };
@@ -126,6 +128,7 @@ impl FrictionEstimator {
             probability: p,
             entropy: 0.0,
             energy: 0.0,
+            unfamiliarity: None,
             quality: None,
             distance_m: self.filter.span_m(&self.settings.filter),
             pictures: self.filter.pictures(),
@@ -144,21 +147,23 @@ impl FrictionEstimator {
         let input = self.seen.insert(self.preprocessor.resize(&crop)?);
         let quality = QualityStatistics::measure(input);
         let classes = self.basis.classes.len();
-        let uniform = vec![1.0 / classes as f64; classes];
+        let unread = |reason| Reading {
+            p: vec![1.0 / classes as f64; classes],
+            entropy: 1.0,
+            energy: 0.0,
+            unfamiliarity: None,
+            quality,
+            refused: Some(reason),
+        };
         if let Some(reason) = self.settings.quality.check(&quality) {
-            return Ok(Reading { p: uniform, entropy: 1.0, energy: 0.0, quality, refused: Some(reason) });
+            return Ok(unread(reason));
         }
         let tensor = normalise(input);
         let Some(network) = self.network.as_mut() else {
-            return Ok(Reading {
-                p: uniform,
-                entropy: 1.0,
-                energy: 0.0,
-                quality,
-                refused: Some(Reason::NetworkFailed),
-            });
+            return Ok(unread(Reason::NetworkFailed));
         };
-        let logits = network.logits(&tensor)?;
+        let Answer { logits, unfamiliarity } = network.read(&tensor)?;
+        let unfamiliarity = unfamiliarity.map(f64::from);
         if logits.len() != classes || !logits.iter().all(|z| z.is_finite()) {
             let message = format!("expected {classes} finite logits, got {logits:?}");
             return Err(FrictionError::Inference { message });
@@ -167,14 +172,15 @@ impl FrictionEstimator {
         let entropy =
             -p.iter().filter(|p| **p > 0.0).map(|p| p * p.ln()).sum::<f64>() / (classes as f64).ln();
         let limits = &self.settings.model;
+        let strange = unfamiliarity.is_some_and(|d| d.is_nan() || d > limits.most_unfamiliarity);
         let refused = if p.iter().all(|p| *p > limits.most_least_probability) {
             Some(Reason::Undecided)
-        } else if energy > limits.most_energy {
+        } else if energy > limits.most_energy || strange {
             Some(Reason::Unfamiliar)
         } else {
             None
         };
-        Ok(Reading { p, entropy, energy, quality, refused })
+        Ok(Reading { p, entropy, energy, unfamiliarity, quality, refused })
     }
 
     fn flat(&self) -> Vec<f64> {
@@ -211,6 +217,7 @@ impl FrictionEstimator {
             probability: self.flat(),
             entropy: 1.0,
             energy: 0.0,
+            unfamiliarity: None,
             quality: None,
             distance_m: 0.0,
             pictures: 0,

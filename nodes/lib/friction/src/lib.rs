@@ -10,8 +10,8 @@
 //!
 //! A network always answers, also about a covered lens. So a picture passes gates before it counts, in this order:
 //! transport (age, layout, a frozen camera), quality of the picture (dark, saturated, noisy, blurred), the network's own
-//! doubt (no state out of the question, energy); then p is averaged over the distance travelled. What fails a gate yields `valid = false`, its
-//! [`Reason`] and the uninformative prior: never zero, never the last value.
+//! doubt (no state out of the question, energy, a picture unlike those of its training); then p is averaged over the distance travelled. What fails
+//! a gate yields `valid = false`, its [`Reason`] and the uninformative prior: never zero, never the last value.
 //!
 //! [`FrictionEstimator`] is the whole pipeline. Nothing here reads a clock or the environment: stamps, distances and folders
 //! come in as arguments.
@@ -41,7 +41,7 @@ pub use estimate::{Estimate, Reason, Source};
 pub use estimator::{FrictionEstimator, Motion};
 pub use files::{find_library, find_model};
 pub use filter::{DistanceFilter, FilterSettings};
-pub use network::{Network, OnnxRuntime};
+pub use network::{Answer, Network, OnnxRuntime};
 pub use odometer::Odometer;
 pub use picture::{Encoding, Frame, FrameData, RawPicture, Region, RgbPicture};
 pub use quality::{QualityLimits, QualityStatistics};

@@ -1,4 +1,4 @@
-//! The network: a tensor in, one logit per road state out.
+//! The network: a tensor in, one logit per road state out, and how unlike its training pictures the picture is.
 
 use std::path::Path;
 use std::sync::Mutex;
@@ -11,13 +11,23 @@ use ort::value::TensorRef;
 use crate::error::FrictionError;
 use crate::tensor::INPUT_SIDE;
 
+/// What a network says of one picture.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Answer {
+    /// One for each road state.
+    pub logits: Vec<f32>,
+    /// Mahalanobis distance of what an early layer makes of the picture from honest pictures, over the root of the number of channels compared: at
+    /// most about one for a usual picture. None from a model that does not tell.
+    pub unfamiliarity: Option<f32>,
+}
+
 /// Something that runs the model.
 pub trait Network: Send {
-    /// The logits of one picture: `tensor` holds three planes of [`INPUT_SIDE`]^2 values.
+    /// Reads one picture: `tensor` holds three planes of [`INPUT_SIDE`]^2 values.
     ///
     /// # Errors
     /// [`FrictionError::Inference`].
-    fn logits(&mut self, tensor: &[f32]) -> Result<Vec<f32>, FrictionError>;
+    fn read(&mut self, tensor: &[f32]) -> Result<Answer, FrictionError>;
 }
 
 /// ONNX Runtime, loaded at run time, on one thread that does not spin.
@@ -65,18 +75,22 @@ fn open(environment: &Environment, model: &Path) -> Result<Session, String> {
         .map_err(text)?;
     let session = builder.commit_from_file(model).map_err(|e| e.to_string())?;
     match (session.inputs().len(), session.outputs().len()) {
-        (1, 1) => Ok(session),
-        (inputs, outputs) => Err(format!("expected 1 input and 1 output, got {inputs} and {outputs}")),
+        (1, 1 | 2) => Ok(session),
+        (inputs, outputs) => Err(format!("expected 1 input and 1 or 2 outputs, got {inputs} and {outputs}")),
     }
 }
 
 impl Network for OnnxRuntime {
-    fn logits(&mut self, tensor: &[f32]) -> Result<Vec<f32>, FrictionError> {
+    fn read(&mut self, tensor: &[f32]) -> Result<Answer, FrictionError> {
         let failed = |e: ort::Error| FrictionError::Inference { message: e.to_string() };
         let side = INPUT_SIDE as usize;
         let input = TensorRef::from_array_view(([1, 3, side, side], tensor)).map_err(failed)?;
         let outputs = self.session.run(ort::inputs![input]).map_err(failed)?;
         let (_, logits) = outputs[0].try_extract_tensor::<f32>().map_err(failed)?;
-        Ok(logits.to_vec())
+        let unfamiliarity = match outputs.len() {
+            1 => None,
+            _ => outputs[1].try_extract_tensor::<f32>().map_err(failed)?.1.first().copied(),
+        };
+        Ok(Answer { logits: logits.to_vec(), unfamiliarity })
     }
 }

@@ -43,10 +43,12 @@ pub struct ModelLimits {
     pub most_least_probability: f64,
     /// Largest energy, -ln sum exp z.
     pub most_energy: f64,
+    /// Largest [`unfamiliarity`](crate::Answer::unfamiliarity).
+    pub most_unfamiliarity: f64,
 }
 
 impl Default for ModelLimits {
     fn default() -> Self {
-        Self { most_least_probability: 0.07, most_energy: -1.7 }
+        Self { most_least_probability: 0.09, most_energy: -1.7, most_unfamiliarity: 1.4 }
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tract_onnx::prelude::*;
 
 use crate::error::FrictionError;
-use crate::network::Network;
+use crate::network::{Answer, Network};
 use crate::tensor::INPUT_SIDE;
 
 /// A model that tract has optimised.
@@ -36,13 +36,16 @@ impl Tract {
 }
 
 impl Network for Tract {
-    fn logits(&mut self, tensor: &[f32]) -> Result<Vec<f32>, FrictionError> {
+    fn read(&mut self, tensor: &[f32]) -> Result<Answer, FrictionError> {
         let side = INPUT_SIDE as usize;
-        let run = || -> TractResult<Vec<f32>> {
+        let run = || -> TractResult<Answer> {
             let input = Tensor::from_shape(&[1, 3, side, side], tensor)?;
             let outputs = self.model.run(tvec!(input.into()))?;
-            let view = outputs[0].to_plain_array_view::<f32>()?;
-            Ok(view.iter().copied().collect())
+            let numbers = |output: &TValue| -> TractResult<Vec<f32>> {
+                Ok(output.to_plain_array_view::<f32>()?.iter().copied().collect())
+            };
+            let unfamiliarity = outputs.get(1).map(numbers).transpose()?.and_then(|d| d.first().copied());
+            Ok(Answer { logits: numbers(&outputs[0])?, unfamiliarity })
         };
         run().map_err(|e| FrictionError::Inference { message: e.to_string() })
     }

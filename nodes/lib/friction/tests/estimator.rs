@@ -3,27 +3,28 @@
 #![allow(clippy::unwrap_used)]
 
 use gripsight_friction::{
-    Basis, Estimate, Frame, FrameData, FrictionError, FrictionEstimator, Motion, Network, RawPicture, Reason,
-    Settings, Source,
+    Answer, Basis, Estimate, Frame, FrameData, FrictionError, FrictionEstimator, Motion, Network, RawPicture,
+    Reason, Settings, Source,
 };
 
-/// Answers with fixed logits.
-struct Says(Vec<f32>);
+/// Answers with fixed logits and a fixed distance.
+struct Says(Vec<f32>, Option<f32>);
 
 impl Network for Says {
-    fn logits(&mut self, _: &[f32]) -> Result<Vec<f32>, FrictionError> {
-        Ok(self.0.clone())
+    fn read(&mut self, _: &[f32]) -> Result<Answer, FrictionError> {
+        Ok(Answer { logits: self.0.clone(), unfamiliarity: self.1 })
     }
 }
 
 const WET: [f32; 5] = [0.0, 9.0, 0.0, 0.0, 0.0];
 
 fn estimator(logits: &[f32]) -> FrictionEstimator {
-    FrictionEstimator::new(
-        Settings::default(),
-        Basis::builtin().unwrap(),
-        Some(Box::new(Says(logits.to_vec()))),
-    )
+    estimator_at(logits, Some(0.7))
+}
+
+fn estimator_at(logits: &[f32], unfamiliarity: Option<f32>) -> FrictionEstimator {
+    let network = Says(logits.to_vec(), unfamiliarity);
+    FrictionEstimator::new(Settings::default(), Basis::builtin().unwrap(), Some(Box::new(network)))
 }
 
 /// A textured grey picture of 64 x 64; `seed` changes its pixels.
@@ -101,6 +102,18 @@ fn a_network_in_doubt_is_not_believed() {
     assert_refused(&at(&mut estimator(&[1.0; 4]), 0, raw(&textured(1)), None), Reason::NetworkFailed);
     let nan = [f32::NAN, 0.0, 0.0, 0.0, 0.0];
     assert_refused(&at(&mut estimator(&nan), 0, raw(&textured(1)), None), Reason::NetworkFailed);
+}
+
+#[test]
+fn a_picture_unlike_the_training_pictures_is_not_believed_however_sure_the_network_is() {
+    let says = |distance| at(&mut estimator_at(&WET, distance), 0, raw(&textured(1)), None);
+    for strange in [1.5, f32::NAN] {
+        assert_refused(&says(Some(strange)), Reason::Unfamiliar);
+    }
+    for usual in [Some(1.0), None] {
+        let got = says(usual);
+        assert!(got.valid() && got.unfamiliarity == usual.map(f64::from), "{got:?}");
+    }
 }
 
 #[test]

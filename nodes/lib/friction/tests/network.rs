@@ -58,25 +58,28 @@ fn the_tensor_is_that_of_training() {
     }
 }
 
-fn assert_golden_logits(network: &mut dyn Network) {
+fn assert_golden_answer(network: &mut dyn Network) {
     let tensor = normalise(&picture(include_bytes!("golden/input.png"), &Region::WHOLE));
-    let got = network.logits(&tensor).unwrap();
-    for (got, want) in got.iter().zip(numbers(&golden()["logits"])) {
+    let golden = golden();
+    let got = network.read(&tensor).unwrap();
+    for (got, want) in got.logits.iter().zip(numbers(&golden["logits"])) {
         assert!((f64::from(*got) - want).abs() < 1e-4, "{got} instead of {want}");
     }
-    assert_eq!(got.len(), 5);
+    assert_eq!(got.logits.len(), 5);
+    let (got, want) = (f64::from(got.unfamiliarity.unwrap()), golden["unfamiliarity"].as_f64().unwrap());
+    assert!((got - want).abs() < 1e-4, "{got} instead of {want}");
 }
 
 #[test]
-fn onnx_runtime_gives_the_training_frameworks_logits() {
+fn onnx_runtime_gives_the_training_frameworks_answer() {
     let Some(library) = library() else { return };
-    assert_golden_logits(&mut OnnxRuntime::load(&library, &model()).unwrap());
+    assert_golden_answer(&mut OnnxRuntime::load(&library, &model()).unwrap());
 }
 
 #[cfg(feature = "tract")]
 #[test]
-fn tract_gives_the_same_logits() {
-    assert_golden_logits(&mut gripsight_friction::Tract::load(&model()).unwrap());
+fn tract_gives_the_same_answer() {
+    assert_golden_answer(&mut gripsight_friction::Tract::load(&model()).unwrap());
 }
 
 #[test]
@@ -90,8 +93,8 @@ fn a_missing_or_broken_library_is_an_error_not_a_panic() {
     assert!(text.contains("libonnxruntime.so"), "{text}");
     // The failure is not sticky.
     if let Some(library) = library() {
-        assert_golden_logits(&mut OnnxRuntime::load(&library, &model()).unwrap());
-        assert_golden_logits(&mut OnnxRuntime::load(&library, &model()).unwrap());
+        assert_golden_answer(&mut OnnxRuntime::load(&library, &model()).unwrap());
+        assert_golden_answer(&mut OnnxRuntime::load(&library, &model()).unwrap());
     }
 }
 
