@@ -110,6 +110,8 @@ def arguments():
     p.add_argument("--init-weights", help="a state_dict to start from; layers of another shape are left out and named")
     p.add_argument("--plain-share", type=float, default=0.0, help="share of the photographs shown as they are, as dry")
     p.add_argument("--finer-share", type=float, default=0.0, help="share of the renders taken by a camera of more pixels")
+    p.add_argument("--minutes", type=float, help="end the run, and its rate's schedule, after so much time of the processor, not after all steps")
+    p.add_argument("--bfloat16", action="store_true", help="forward and backward in bfloat16 where torch's autocast allows")
     p.add_argument("--seed", type=int, default=2024)
     p.add_argument("--workers", type=int, default=1)
     p.add_argument("--threads", type=int, default=1)
@@ -145,15 +147,17 @@ def main():
     total = sum(steps for _, steps in stages)
     validation = validation_set(args)
     wall, cpu, step, running = time.time(), time.process_time(), 0, []
-    rows = []
-    for index, stage in enumerate(stages):
+    rows, progress = [], 0.0
+    for stage in stages:
         for x, target, _ in batches_of(args, stage, first=step * args.batch):
             for group in optimizer.param_groups:
-                group["lr"] = args.rate * rate_at(args.recipe, step / total, args.epochs)
+                group["lr"] = args.rate * rate_at(args.recipe, progress, args.epochs)
             net.train()
             if torch.rand(()) < 0.5:
                 x = x.flip(3)
-            loss = losses(net(x.to(memory_format=torch.channels_last)), target).mean()
+            with torch.autocast("cpu", torch.bfloat16, enabled=args.bfloat16):
+                logits = net(x.to(memory_format=torch.channels_last))
+            loss = losses(logits.float(), target).mean()
             optimizer.zero_grad(set_to_none=True)
             loss.backward()
             optimizer.step()
@@ -163,7 +167,8 @@ def main():
             with torch.no_grad():
                 for a, b in zip(average.state_dict().values(), net.state_dict().values()):
                     a.lerp_(b, 1 - keep) if a.is_floating_point() else a.copy_(b)
-            if step % max(total // args.evals, 1) == 0 or step == total:
+            progress = min((time.process_time() - cpu) / (60 * args.minutes), 1.0) if args.minutes else step / total
+            if progress * args.evals >= len(rows) + 1:
                 val_loss, rmse, constant = validate(average, validation)
                 rows.append({"step": step, "size": stage[0], "pictures": step * args.batch, "train_loss": np.mean(running),
                              "val_loss": val_loss, "val_rmse": rmse, "val_constant": constant,
@@ -175,6 +180,8 @@ def main():
                     writer.writeheader()
                     writer.writerows(rows)
                 torch.save(average.state_dict(), out / "last.pt")
+            if progress >= 1:
+                break
     curves(out / "log.csv", out / "curves.png")
     versions = {"torch": torch.__version__, "torchvision": torchvision.__version__, "numpy": np.__version__}
     kept = {k: v for k, v in vars(args).items() if k not in ("photographs", "rscd", "out", "init_weights")}
