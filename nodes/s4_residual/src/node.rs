@@ -43,10 +43,17 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
             .choices(&["s4", "mlp", "rnn", "none"])
             .read_only(),
     )?;
+    let default = Config::default();
+    let epochs = node.parameter(
+        "epochs",
+        default.epochs as i64,
+        Descriptor::new("Epochs of training at most, each turn").range(1.0..=1000.0).read_only(),
+    )?;
     let config = Config {
         method: if method.get() == "paper" { Method::Paper } else { Method::Robust },
         residual: ResidualKind::from_name(&residual.get()).unwrap_or_default(),
-        ..Config::default()
+        epochs: epochs.get() as usize,
+        ..default
     };
     let mut sequences = node.subscription::<SequenceMessage>("sequence", Qos::latched().with_depth(64))?;
     let mut candidates = node.subscription::<PacejkaParams>("candidate", Qos::latched())?;
