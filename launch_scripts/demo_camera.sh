@@ -13,18 +13,20 @@ the turns of the outer loop. Needs what launch_scripts/setup.sh --tests installs
 
   --method METHOD     paper or robust                                              [paper]
   --window SECONDS    how much of the drive is identified from                     [9: the first acceleration]
+  --epochs N           of training the residual network, each turn                    [10]
   --mu "MU..."        the roads' friction                                          [0.85 0.80 0.60]
-  --seeds "N..."      drives on each; odd ones go round the other way              [81 82 83 84]
+  --seeds "N..."      drives on each; odd ones go round the other way              [101 102 103 104]
   --out FOLDER        bags, recordings, logs and runs.csv                          [out/demo_camera]
   --bin FOLDER        the built binaries                                           [target/release]
 TEXT
 }
 
-method=paper window=9 mus='0.85 0.80 0.60' seeds='81 82 83 84' out=out/demo_camera bin=target/release
+method=paper window=9 epochs=10 mus='0.85 0.80 0.60' seeds='101 102 103 104' out=out/demo_camera bin=target/release
 while (($#)); do
     case $1 in
         --method) method=$2 ;;
         --window) window=$2 ;;
+        --epochs) epochs=$2 ;;
         --mu) mus=$2 ;;
         --seeds) seeds=$2 ;;
         --out) out=$2 ;;
@@ -48,6 +50,7 @@ mkdir -p "$out"
 # The reference car's pictures show nothing but road: the region is all of them.
 sed -E "s/^( *method:) .*/\1 $method/; s/^( *window_s:) .*/\1 $window.0/; s/^( *hop_s:) .*/\1 $window.0/" params/suite.yaml > "$out/params.yaml"
 printf '\ncamera_prior:\n  ros__parameters:\n    region: [0.0, 0.0, 1.0, 1.0]\n' >> "$out/params.yaml"
+printf '\ns4_residual:\n  ros__parameters:\n    epochs: %d\n' "$epochs" >> "$out/params.yaml"
 
 # One drive through the suite; the recorder ends with the first run of the identification.
 play() {

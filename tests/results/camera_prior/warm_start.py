@@ -15,10 +15,8 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 PROPOSED = 1
-# The run ends at the first; the turns after which it would have ended at the other.
-TOLERANCES = (0.02, 0.05)
-# The identifier's max_iterations.
-TURNS = 8
+CAMERA = 2
+WITHIN = (0.02, 0.03, 0.05, 0.1, 0.15, 0.2, 0.3)
 
 
 def force(tire, slip):
@@ -51,7 +49,7 @@ def turns_of(recording):
     tires, change, end, prior = {}, {}, None, None
     with open(recording, "rb") as file:
         for _, channel, _, m in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
-            if channel.topic == "/camera_prior/friction" and not tires and m.valid:
+            if channel.topic == "/camera_prior/friction" and not tires and m.valid and m.source == CAMERA:
                 prior = (m.mu, m.sigma)
             if channel.topic == "/identifier/progress" and m.handshake.iteration:
                 change[m.handshake.iteration] = m.change
@@ -72,6 +70,8 @@ def rows(folder):
         drive, camera, _ = recording.name.rsplit(".", 2)
         mu, seed = drive.removeprefix("mu").split("_seed")
         tires, end, prior = turns_of(recording)
+        if camera == "with" and not prior:
+            sys.exit(f"{recording}: no prior from the camera's pictures before the run began")
         yaml = Path(folder) / f"{drive}.vehicle.yaml"
         true = truth(Path(folder) / f"{drive}.truth.csv", {key: number(yaml, key) for key in ("l_f_m", "l_r_m")})
         seen = [np.linspace(s.low, s.high, 101) for s in (end.front_slip_rad, end.rear_slip_rad)]
@@ -94,9 +94,9 @@ def read(path):
     return dict(sorted(runs.items(), key=lambda run: (-float(run[0][0]), run[0][1])))
 
 
-def settled(run, tolerance):
-    """The first turn that moved the curves by less than this; none within the turns of the run."""
-    return next((int(row["turn"]) for row in run[1:] if float(row["change"]) < tolerance), None)
+def ended(run):
+    """The turns that the run took."""
+    return int(run[-1]["turn"])
 
 
 def close(run, tolerance):
@@ -104,36 +104,32 @@ def close(run, tolerance):
     return max((int(row["turn"]) + 1 for row in run if float(row["to_the_end"]) > tolerance), default=0)
 
 
-def counted(runs, title, tolerances, turns_of_run):
-    """Mean turns on each road and all, and on how many drives they are fewer, as many and more with the camera."""
+def counted(runs, title, counts):
+    """Mean turns on each road and all, and on how many drives they are fewer, as many and more with the camera; a row for each way to count."""
     mus = [*dict.fromkeys(mu for mu, _ in runs), "all"]
     print(f"\n| {title} | " + " | ".join(f"{mu}, without | with" for mu in mus) + " | fewer, as many, more with |")
     print("| --- " * (2 * len(mus) + 2) + "|")
-    for tolerance in tolerances:
-        turns = {mu: [[turns_of_run(pair[c], tolerance) for c in ("without", "with")] for (m, _), pair in runs.items() if mu in (m, "all")] for mu in mus}
+    for name, turns_of_run in counts.items():
+        turns = {mu: [[turns_of_run(pair[c]) for c in ("without", "with")] for (m, _), pair in runs.items() if mu in (m, "all")] for mu in mus}
         means = [f"{statistics.mean(t[k] for t in turns[mu]):.2f}" for mu in mus for k in (0, 1)]
         signs = [str(sum((b > a) - (b < a) == sign for a, b in turns["all"])) for sign in (-1, 0, 1)]
-        print(f"| {tolerance:.0%} | {' | '.join(means)} | {', '.join(signs)} |")
+        print(f"| {name} | {' | '.join(means)} | {', '.join(signs)} |")
 
 
 def table(path, picture=None):
     runs = read(path)
     both = lambda cells: " | ".join(map(str, cells))
-    print("| mu | seed | prior | start off by, without | with | first turn's change, without | with | turns at 2 %, without | with | at 5 %, without | with | stiffness over the truth, front / rear, without | with | RMSE of F_y/F_z, without | with |")
-    print("| --- " * 15 + "|")
+    print("| mu | seed | prior | start off by, without | with | first turn's change, without | with | turns, without | with | stiffness over the truth, front / rear, without | with | RMSE of F_y/F_z, without | with |")
+    print("| --- " * 13 + "|")
     for (mu, seed), pair in runs.items():
         pair = [pair["without"], pair["with"]]
         ratio = lambda run: " / ".join(f"{float(run[-1][f'stiffness_n_per_rad_{a}']) / float(run[-1][f'true_stiffness_n_per_rad_{a}']):.2f}" for a in ("front", "rear"))
         cells = [mu, seed, f"{pair[1][0]['prior_mu']} +- {pair[1][0]['prior_sigma']}"]
         cells += [f"{float(run[0]['to_the_end']):.0%}" for run in pair] + [f"{float(run[1]['change']):.0%}" for run in pair]
-        cells += [settled(run, tolerance) or "-" for tolerance in TOLERANCES for run in pair]
+        cells += [ended(run) for run in pair]
         cells += [ratio(run) for run in pair] + [f"{run[-1]['rmse_front']} / {run[-1]['rmse_rear']}" for run in pair]
         print(f"| {both(cells)} |")
-    mus = [*dict.fromkeys(mu for mu, _ in runs), "all"]
-    of = lambda mu: [[pair["without"], pair["with"]] for (m, _), pair in runs.items() if mu in (m, "all")]
-    # A run that did not settle counts one turn more than it may take.
-    counted(runs, "tolerance", (0.02, 0.03, 0.05, 0.1, 0.15, 0.2, 0.3), lambda run, t: settled(run, t) or TURNS + 1)
-    counted(runs, "stays within", (0.02, 0.03, 0.05, 0.1, 0.15, 0.2, 0.3), close)
+    counted(runs, "turns", {"of the run": ended} | {f"until within {w:.0%} of its end": lambda run, w=w: close(run, w) for w in WITHIN})
     print("\n| after | furthest from the end's curves, median without | with | RMSE of F_y/F_z front / rear, median without | with |")
     print("| --- " * 5 + "|")
     for name, turn in (("the start", 0), ("one turn", 1), ("the last turn", -1)):
