@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::effects::EffectId;
-use crate::engine::{Engine, Nominal, State};
+use crate::engine::Engine;
 use crate::evaluate::{Estimate, bootstrap, by_block, interval, mean, of_picked};
 use crate::flexible::{Flexible, Room};
 use crate::model::ExtendedModel;
@@ -11,7 +11,8 @@ use crate::outcome::GapBudget;
 use crate::recording::Recording;
 use crate::residual::Residual;
 use crate::select::Round;
-use crate::windows::{HORIZON_S, Split, Windows, of_length, split};
+use crate::state::{Nominal, State};
+use crate::windows::{HORIZON_S, Split, WINDOW_S, Windows, of_length, split};
 
 /// Errors of the models on the scored blocks.
 #[derive(Debug, Clone)]
@@ -50,6 +51,7 @@ pub(crate) struct Scorer<'a> {
     engine: Engine<'a>,
     windows: Windows,
     scored_on: &'static str,
+    held_out: bool,
 }
 
 impl<'a> Scorer<'a> {
@@ -60,24 +62,26 @@ impl<'a> Scorer<'a> {
                 engine: Engine { recording, ..engine.clone() },
                 windows: of_length(recording, &split(recording, false).training, HORIZON_S),
                 scored_on: "another bag",
+                held_out: true,
             },
             None if windows.held_out.windows.is_empty() => Self {
                 engine: engine.clone(),
                 windows: of_length(engine.recording, &windows.training, HORIZON_S),
                 scored_on: "training blocks (too little data to hold any out)",
+                held_out: false,
             },
             None => Self {
                 engine: engine.clone(),
                 windows: windows.held_out.clone(),
                 scored_on: "held-out blocks",
+                held_out: true,
             },
         }
     }
 
-    /// Mean squared error of a state over the noise.
-    pub(crate) fn error(&self, state: &State) -> f64 {
-        let score = self.engine.score(&state.effects, None, &state.parameters, &self.windows);
-        mean(&by_block(self.engine.recording, &self.windows, &score))
+    /// What sizes are compared on: the held-out data in windows as they are fitted. Nothing where no data are held out.
+    pub(crate) fn apart(&self) -> Option<(&Engine<'a>, Windows)> {
+        self.held_out.then(|| (&self.engine, of_length(self.engine.recording, &self.windows, WINDOW_S)))
     }
 }
 
@@ -92,7 +96,7 @@ impl Budget {
     /// Scores the models.
     pub(crate) fn of(engine: &Engine<'_>, scorer: &Scorer<'_>, windows: &Split, models: &Models<'_>) -> Self {
         let Models { nominal, null, state, found, last } = *models;
-        let Scorer { engine: scorer, windows: on, scored_on } = scorer;
+        let Scorer { engine: scorer, windows: on, scored_on, .. } = scorer;
         let blocks = |effects: &[EffectId], flexible: Option<&Flexible>, p: &[f64]| {
             by_block(scorer.recording, on, &scorer.score(effects, flexible, p, on))
         };

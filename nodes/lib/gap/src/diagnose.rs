@@ -5,12 +5,14 @@ use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 
 use crate::budget::{Budget, Models, Scorer, large_slip_rad};
 use crate::effects::{EffectId, Need};
-use crate::engine::{Engine, State};
+use crate::engine::Engine;
 use crate::outcome::{DetectionLimit, Diagnosis, Invisible, TirePair, Unexplained};
 use crate::recording::Recording;
 use crate::rooms::{Left, explained};
 use crate::search::{Found, search};
 use crate::select::reweigh;
+use crate::state::State;
+use crate::transfer::drifts;
 use crate::trust::TireTrust;
 use crate::usable::{Usable, cannot_tell, refused, usable};
 use crate::verdict::{Remains, claims, decide, looks, rank};
@@ -132,10 +134,11 @@ fn explain(
     let explained = explained(&engine, &state, &windows.training);
     let noise_is_known = noise::is_known(&recording);
     let scorer = Scorer::new(&engine, other.as_ref(), &windows);
-    let held_out = [scorer.error(&null), scorer.error(&state)];
-    let remains = Remains { before: &before, after: &after, explained: &explained, held_out, noise_is_known };
+    let drifts = drifts(&engine, &state, &windows.training, scorer.apart());
+    let remains =
+        Remains { before: &before, after: &after, explained: &explained, drifts: &drifts, noise_is_known };
     let blocks = &windows.training.block;
-    let claims = claims(&engine, &evidence, &state, &remains, blocks);
+    let claims = claims(&engine, &evidence, &state, &remains, &library, blocks);
     // What is no more than a candidate is left out of the model.
     let named: Vec<EffectId> = claims.iter().filter(|c| c.named).map(|c| c.effect).collect();
     let model = if named.is_empty() {
@@ -190,7 +193,7 @@ fn explain(
         unexplained: Unexplained {
             cost: [before.cost, after.cost],
             explained: state.named.iter().map(|e| e.name()).zip(explained.iter().copied()).collect(),
-            held_out,
+            drift: state.named.iter().map(|e| e.name()).zip(drifts.iter().copied()).collect(),
             rooms: before.gains.iter().zip(&after.gains).map(|(b, a)| (b.0.name(), [b.1, a.1])).collect(),
         },
         series: pictures::series(&engine, &nominal, &null, &model, &on_all, &nominal_score, scored_windows),

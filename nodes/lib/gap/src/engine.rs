@@ -7,8 +7,9 @@ use gripsight_vehicle::{PacejkaParameters, VehicleParameters, handling};
 
 use crate::effects::{EffectId, ParameterSpec};
 use crate::flexible::Flexible;
-use crate::model::{BASE, ExtendedModel, HOLD, TIRES, tires_from_parameters, tires_to_parameters};
+use crate::model::{BASE, ExtendedModel, HOLD, TIRES, tires_to_parameters};
 use crate::recording::Recording;
+use crate::state::{Nominal, Score, State};
 use crate::trust::TireTrust;
 use crate::windows::Windows;
 
@@ -35,52 +36,6 @@ pub(crate) const ROBUST_K: f64 = 3.0;
 
 /// Standard deviation that parameters of flexible terms are expected to have.
 pub(crate) const FLEXIBLE_RIDGE: f64 = 1.0;
-
-/// A model with its parameters fitted.
-#[derive(Debug, Clone)]
-pub(crate) struct State {
-    /// Effects that are claimed.
-    pub(crate) named: Vec<EffectId>,
-    /// All of the model: the background that is not claimed, what was handed over, then those that are claimed.
-    pub(crate) effects: Vec<EffectId>,
-    pub(crate) parameters: Vec<f64>,
-    /// Places of the parameters that its fit moved.
-    pub(crate) free: Vec<usize>,
-    pub(crate) starts: Vec<[f64; 2]>,
-    pub(crate) cost: f64,
-    pub(crate) window_costs: Vec<f64>,
-    /// Residuals that its fit counted.
-    pub(crate) residuals: f64,
-    pub(crate) finite: bool,
-    /// The problem around it, where it was fitted to the end.
-    pub(crate) fit: Option<Box<Fit>>,
-}
-
-impl State {
-    /// Parameters of one of its effects.
-    pub(crate) fn of(&self, effect: EffectId) -> Option<&[f64]> {
-        let mut from = BASE;
-        for &e in &self.effects {
-            let n = e.spec().parameters.len();
-            if e == effect {
-                return Some(&self.parameters[from..from + n]);
-            }
-            from += n;
-        }
-        None
-    }
-
-    pub(crate) fn tires(&self) -> PacejkaParameters {
-        tires_from_parameters(&self.parameters[..TIRES])
-    }
-}
-
-/// The model as it was handed over.
-#[derive(Debug, Clone)]
-pub(crate) struct Nominal {
-    pub(crate) effects: Vec<EffectId>,
-    pub(crate) parameters: Vec<f64>,
-}
 
 /// Effects with their parameters, as they are fitted.
 pub(crate) type Sized = Vec<(EffectId, Vec<f64>)>;
@@ -469,13 +424,4 @@ impl<'a> Engine<'a> {
         let end = shooting::descend(&problem, None);
         Score { squares: end.at.window_costs, starts: end.starts }
     }
-}
-
-/// Errors of a model on windows.
-#[derive(Debug, Clone)]
-pub(crate) struct Score {
-    /// Sum of squares of each window over the noise variance.
-    pub(crate) squares: Vec<f64>,
-    /// The start states that go with them.
-    pub(crate) starts: Vec<[f64; 2]>,
 }

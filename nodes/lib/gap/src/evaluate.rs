@@ -4,8 +4,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use crate::engine::Score;
 use crate::recording::Recording;
+use crate::state::Score;
 use crate::windows::Windows;
 
 /// A figure with its 90 % interval. What is not known is not a number, `null` in JSON.

@@ -15,7 +15,8 @@ use std::collections::BTreeMap;
 use gripsight_vehicle::PacejkaParameters;
 use serde::{Deserialize, Serialize};
 
-use crate::engine::{Engine, Sized, State};
+use crate::engine::{Engine, Sized};
+use crate::state::State;
 use crate::{EffectId, GapError};
 
 /// Tires and effects with their parameters, under the names and in the form in which they are fitted

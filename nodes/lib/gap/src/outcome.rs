@@ -236,10 +236,11 @@ pub struct Unexplained {
     /// free terms of that place would explain on windows that they were not fitted to; beside the effects found, on the 85 % of the windows
     /// that the model follows best.
     pub rooms: BTreeMap<&'static str, [f64; 2]>,
-    /// Mean squared error of the rollouts on held-out data over the noise variance.
-    pub held_out: [f64; 2],
     /// By effect found: how much of the weighted cost per residual it explains beside the others.
     pub explained: BTreeMap<&'static str, f64>,
+    /// By effect found: how far its size drifts between this and the held-out data and between halves of this, as a share of it. A cause
+    /// has one size.
+    pub drift: BTreeMap<&'static str, f64>,
 }
 
 /// A diagnosis.

@@ -2,10 +2,11 @@
 
 use gripsight_identification::shooting::{Rollout, Window};
 
-use crate::engine::{Engine, Nominal, Score, State};
+use crate::engine::Engine;
 use crate::evaluate::{by_block, mean};
 use crate::outcome::{Prediction, Series};
 use crate::place::heat;
+use crate::state::{Nominal, Score, State};
 use crate::windows::{Windows, of_length};
 
 /// Length of the overlay of the worst stretch.

@@ -2,10 +2,11 @@
 
 use gripsight_identification::shooting::Rollout;
 
-use crate::engine::{Engine, Nominal, Score};
+use crate::engine::Engine;
 use crate::outcome::{Place, Where};
 use crate::recording::Channel;
 use crate::smooth::quantile;
+use crate::state::{Nominal, Score};
 use crate::windows::Windows;
 
 /// A sample's circumstances and its squared errors.

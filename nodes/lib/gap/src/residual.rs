@@ -14,9 +14,10 @@ use gripsight_vehicle::{Dual, Real as _};
 use nalgebra::{Matrix4, Vector4};
 use rayon::prelude::*;
 
-use crate::engine::{Engine, State};
+use crate::engine::Engine;
 use crate::model::ExtendedModel;
 use crate::recording::Run;
+use crate::state::State;
 use crate::windows::{HORIZON_S, Windows, of_length};
 
 /// Step of the network.

@@ -5,14 +5,15 @@ use gripsight_identification::shooting::{self, Linearization, Parameter};
 use nalgebra::{DMatrix, DVector};
 
 use crate::effects::EffectId;
-use crate::engine::{Engine, FLEXIBLE_RIDGE, State};
+use crate::engine::{Engine, FLEXIBLE_RIDGE};
 use crate::flexible::{Flexible, Room};
 use crate::search::without;
 use crate::smooth::quantile;
+use crate::state::State;
 use crate::windows::Windows;
 
 /// The engine with the channels counted by their noise.
-fn by_noise<'a>(engine: &Engine<'a>) -> Engine<'a> {
+pub(crate) fn by_noise<'a>(engine: &Engine<'a>) -> Engine<'a> {
     Engine { sigma: engine.recording.weights.clone(), ..engine.clone() }
 }
 
@@ -77,10 +78,7 @@ impl Left {
             by_noise(engine).fit(&state.named, &state.parameters, Some(state.starts.clone()), windows, 0);
         let most = quantile(now.window_costs.clone(), CALM);
         let kept: Vec<usize> = (0..windows.windows.len()).filter(|&k| now.window_costs[k] <= most).collect();
-        let calm = Windows {
-            windows: kept.iter().map(|&k| windows.windows[k]).collect(),
-            block: kept.iter().map(|&k| windows.block[k]).collect(),
-        };
+        let calm = windows.picked(&kept);
         let state = State { starts: kept.iter().map(|&k| state.starts[k]).collect(), ..state.clone() };
         let left = Self::by(engine, &state, &calm, slip_rad);
         Self { cost: now.cost / now.residuals, ..left }
@@ -90,6 +88,11 @@ impl Left {
     pub(crate) fn most(&self) -> f64 {
         let any = |room: Room| if room == Room::Drive { OF_ANY_DRIVE } else { 0.0 };
         self.gains.iter().map(|(room, gain)| gain - any(*room)).fold(0.0, f64::max)
+    }
+
+    /// What one room explains.
+    pub(crate) fn of(&self, room: Room) -> f64 {
+        self.gains.iter().find(|(r, _)| *r == room).map_or(0.0, |(_, gain)| *gain)
     }
 
     /// The room that explains most, where that is telling.
@@ -116,7 +119,7 @@ fn gain(engine: &Engine<'_>, state: &State, windows: &Windows, flexible: &Flexib
         Half::new(&linearization, &parameters)
     };
     let (a, b) = (half(0), half(1));
-    let pinned = |j: &usize| state.fit.as_ref().is_some_and(|f| f.on_bound.contains(j));
+    let pinned = |j: &usize| state.is_held(*j);
     let moving: Vec<usize> =
         a.places.iter().enumerate().filter(|(_, j)| !pinned(j)).map(|(row, _)| row).collect();
     let is_own = |row: usize| a.places[row] < state.parameters.len();

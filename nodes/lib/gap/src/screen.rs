@@ -3,8 +3,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::effects::EffectId;
-use crate::engine::{Engine, State};
+use crate::engine::Engine;
 use crate::model::BASE;
+use crate::state::State;
 use crate::windows::Windows;
 
 /// What the Jacobian says of a candidate.
@@ -56,7 +57,7 @@ pub(crate) fn screen(
     let free: Vec<usize> = (0..values.len()).filter(|&j| parameters[j].free).collect();
     let row_of = |j: usize| free.iter().position(|&f| f == j);
     // What is on its bound does not move along.
-    let bound = |j: &usize| state.fit.as_ref().is_some_and(|f| f.on_bound.contains(j));
+    let bound = |j: &usize| state.is_held(*j);
     let own: Vec<usize> = state.free.iter().copied().filter(|j| !bound(j)).filter_map(row_of).collect();
     let place = |effect: EffectId| {
         let before: usize =

@@ -1,8 +1,9 @@
 //! The search for several effects: one after the other, what became needless dropped again, and every one challenged at the end.
 
 use crate::effects::EffectId;
-use crate::engine::{Engine, State};
+use crate::engine::Engine;
 use crate::select::{Refit, Round, difference, needed, relative_size, reweigh, round, thresholds};
+use crate::state::State;
 use crate::windows::Windows;
 
 /// What a search has come to.

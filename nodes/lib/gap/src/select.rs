@@ -3,10 +3,11 @@
 use gripsight_identification::shooting::Rollout;
 
 use crate::effects::EffectId;
-use crate::engine::{Engine, State};
+use crate::engine::Engine;
 use crate::screen::{Screened, Screening, screen};
 use crate::sizes::is_misshapen;
 use crate::smooth::median;
+use crate::state::State;
 use crate::windows::Windows;
 
 /// Thresholds of the decisions. Fixed on development cases of the reference car (seeds below 1000); see `tests/results/gap`.
@@ -24,11 +25,11 @@ pub(crate) mod thresholds {
     /// Weighted cost per residual that noise alone leaves.
     pub(crate) const NOISE_COST: f64 = 0.75;
     /// Drop of the weighted cost per residual below which an effect does not matter.
-    pub(crate) const LEAST_GAIN: f64 = 0.03;
+    pub(crate) const LEAST_GAIN: f64 = 0.012;
     /// Weighted cost per residual up to which there is no gap to explain.
     pub(crate) const SMALL_COST: f64 = 1.3;
     /// Share of the remaining weighted cost that a first and a later effect must close.
-    pub(crate) const LEAST_SHARE: [f64; 2] = [0.08, 0.08];
+    pub(crate) const LEAST_SHARE: [f64; 2] = [0.05, 0.05];
     /// How sure it must be that a candidate beats the current model, in standard deviations over blocks.
     pub(crate) const LEAST_Z: f64 = 2.0;
     /// The same for an effect that sits in one part of the lap: other blocks do not hold it.

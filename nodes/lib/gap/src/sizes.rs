@@ -5,9 +5,8 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use crate::effects::EffectId;
-use crate::engine::State;
-use crate::model::BASE;
 use crate::outcome::EffectParameter;
+use crate::state::State;
 
 /// Half width of a 90 % interval in standard deviations.
 const NINETY: f64 = 1.645;
@@ -57,9 +56,9 @@ pub(crate) fn sizes(
 
 /// Whether a parameter that shapes the effect is held by its upper bound: a lag that wants less damping than any servo has is no lag.
 pub(crate) fn is_misshapen(state: &State, effect: EffectId) -> bool {
-    let (Some(own), Some(fit)) = (state.of(effect), &state.fit) else { return false };
-    let from = first_row(state, effect);
-    let held = |i: usize| fit.on_bound.contains(&(from + i)) && own[i] > effect.spec().parameters[i].null;
+    let Some(own) = state.of(effect) else { return false };
+    let from = state.rows(effect).start;
+    let held = |i: usize| state.is_held(from + i) && own[i] > effect.spec().parameters[i].null;
     !effect.is_of_a_place() && (effect.sizing()..own.len()).any(held)
 }
 
@@ -68,25 +67,17 @@ pub(crate) fn is_misshapen(state: &State, effect: EffectId) -> bool {
 pub(crate) fn is_told(state: &State, effect: EffectId, absent: &[f64], blocks: &[usize]) -> bool {
     let Some(own) = state.of(effect) else { return false };
     let halves = half_widths(state, effect, own, blocks);
-    let from = first_row(state, effect);
+    let from = state.rows(effect).start;
     let sizing = effect.sizing();
     let away = |i: usize| own[i] - absent[i];
-    let held = |i: usize| {
-        state.fit.as_ref().is_some_and(|f| f.on_bound.contains(&(from + i))) && away(i).abs() > 1e-9
-    };
+    let held = |i: usize| state.is_held(from + i) && away(i).abs() > 1e-9;
     let told = effect.is_of_a_place() || (0..sizing).any(|i| away(i).abs() > halves[i]);
     told && !is_misshapen(state, effect) && !(0..sizing).any(held)
 }
 
-/// Place of an effect's first parameter in a state.
-fn first_row(state: &State, effect: EffectId) -> usize {
-    let before = state.effects.iter().take_while(|e| **e != effect);
-    BASE + before.map(|e| e.spec().parameters.len()).sum::<usize>()
-}
-
 /// Half widths of the 90 % intervals of an effect's parameters.
 fn half_widths(state: &State, effect: EffectId, own: &[f64], blocks: &[usize]) -> Vec<f64> {
-    let from = first_row(state, effect);
+    let from = state.rows(effect).start;
     (0..own.len())
         .map(|i| {
             let error = standard_error(state, from, from + i, own.len(), blocks);

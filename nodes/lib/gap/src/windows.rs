@@ -37,6 +37,12 @@ impl Windows {
         Self { windows, block }
     }
 
+    /// Some of them, by place.
+    pub(crate) fn picked(&self, places: &[usize]) -> Self {
+        let windows = places.iter().map(|&k| self.windows[k]).collect();
+        Self { windows, block: places.iter().map(|&k| self.block[k]).collect() }
+    }
+
     /// Those of some blocks.
     pub(crate) fn of_blocks(&self, wanted: impl Fn(usize) -> bool) -> Self {
         let kept = self.windows.iter().zip(&self.block).filter(|(_, b)| wanted(**b));

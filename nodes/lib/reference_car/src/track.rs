@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 use crate::error::ReferenceCarError;
 
 /// Names of the closed tracks.
-pub const TRACK_NAMES: [&str; 9] =
-    ["oval", "club", "esses", "bean", "clover", "harbor", "valley", "quarry", "delta"];
+pub const TRACK_NAMES: [&str; 11] =
+    ["oval", "club", "esses", "bean", "clover", "harbor", "valley", "quarry", "delta", "lagoon", "ridge"];
 
 /// A closed centre line, sampled evenly by arc length.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,6 +61,8 @@ fn shape(name: &str) -> Option<Shape> {
         "valley" => Shape { size_m: 225.0, cosines: &[(1, 0.2), (3, 0.12)], sines: &[(2, 0.18), (5, 0.02)] },
         "quarry" => Shape { size_m: 215.0, cosines: &[(2, 0.12), (3, 0.14)], sines: &[(1, 0.18), (4, 0.04)] },
         "delta" => Shape { size_m: 200.0, cosines: &[(1, 0.12), (5, 0.03)], sines: &[(2, 0.2), (3, 0.12)] },
+        "lagoon" => Shape { size_m: 210.0, cosines: &[(1, 0.15), (4, 0.06)], sines: &[(2, 0.14), (3, 0.13)] },
+        "ridge" => Shape { size_m: 220.0, cosines: &[(2, 0.24), (5, 0.04)], sines: &[(1, 0.12), (3, -0.11)] },
         _ => return None,
     };
     Some(shape)

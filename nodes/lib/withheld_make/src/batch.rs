@@ -187,7 +187,10 @@ impl Batch {
             let effects = asked
                 .into_iter()
                 .zip(fits)
-                .map(|(setting, fit)| sealed(setting, Some(fit)))
+                .map(|(setting, fit)| {
+                    let severity = fit.severity * draw::beyond_usual(&scenario.car, mu, &setting);
+                    sealed(setting, Some(OracleFit { severity, ..fit }))
+                })
                 .collect::<Result<_, _>>()?;
             return Ok(CaseLabel {
                 case,

@@ -34,9 +34,11 @@ impl Pool {
 
     fn tracks(self) -> &'static [&'static str] {
         match self {
-            // The last two were in test batches whose labels are open now.
-            Self::Development => &["oval", "club", "esses", "bean", "clover", "harbor", "valley"],
-            Self::Test => &["quarry", "delta"],
+            // The last four were in test batches whose labels are open now.
+            Self::Development => {
+                &["oval", "club", "esses", "bean", "clover", "harbor", "valley", "quarry", "delta"]
+            }
+            Self::Test => &["lagoon", "ridge"],
         }
     }
 
@@ -160,17 +162,32 @@ fn car(name: &str, spread: f64, random: &mut ChaCha8Rng) -> Result<CarParameters
     Ok(car)
 }
 
+/// What every car has a little of, as drawn.
+const BACKGROUND: [&str; 4] =
+    ["lateral_load_transfer", "longitudinal_load_transfer", "tire_relaxation", "combined_slip"];
+/// How little: from this share of what the car would have to this.
+const LITTLE: [f64; 2] = [0.1, 0.3];
+
 /// Small amounts of what every car has: load transfer, relaxation, combined slip.
 fn background(car: &CarParameters, mu: f64, random: &mut ChaCha8Rng) -> Vec<EffectSetting> {
-    const KEPT: [&str; 4] =
-        ["lateral_load_transfer", "longitudinal_load_transfer", "tire_relaxation", "combined_slip"];
     let mut own = car.own_effects(mu);
-    own.retain(|effect| KEPT.contains(&effect.name.as_str()));
+    own.retain(|effect| BACKGROUND.contains(&effect.name.as_str()));
     for effect in &mut own {
-        let share = random.random_range(0.1..0.3);
+        let share = random.random_range(LITTLE[0]..LITTLE[1]);
         effect.parameters.values_mut().for_each(|value| *value *= share);
     }
     own
+}
+
+/// Share of an effect beyond what any car may have of it: all of it, but for the background.
+pub(crate) fn beyond_usual(car: &CarParameters, mu: f64, setting: &EffectSetting) -> f64 {
+    if !BACKGROUND.contains(&setting.name.as_str()) {
+        return 1.0;
+    }
+    let own = car.own_effects(mu).into_iter().find(|own| own.name == setting.name);
+    let value = |setting: &EffectSetting| setting.parameters.values().next().copied().unwrap_or(0.0);
+    let usual = LITTLE[1] * own.as_ref().map_or(0.0, value);
+    (1.0 - usual / value(setting).max(1e-9)).max(0.0)
 }
 
 /// Names of the library's effects, or of those that it does not have.
@@ -277,6 +294,23 @@ mod tests {
             assert!(!kept.contains(&"gyro_bias".to_owned()) && deleted.contains(&"gyro_bias".to_owned()));
             assert!(deleted.is_sorted());
         }
+    }
+
+    #[test]
+    fn what_a_car_may_have_anyway_is_no_effect() {
+        let car = CarParameters::by_name("f1tenth").unwrap();
+        let own = car.own_effects(1.0);
+        let of = |name: &str, share: f64| {
+            let mut effect = own.iter().find(|e| e.name == name).unwrap().clone();
+            effect.parameters.values_mut().for_each(|v| *v *= share);
+            beyond_usual(&car, 1.0, &effect)
+        };
+        for name in BACKGROUND {
+            assert_eq!(of(name, 0.25), 0.0);
+            assert!((of(name, 0.9) - 2.0 / 3.0).abs() < 1e-12);
+        }
+        // Drag is put in, but no car of a batch has it otherwise.
+        assert_eq!(of("aero_drag", 0.1), 1.0);
     }
 
     #[test]

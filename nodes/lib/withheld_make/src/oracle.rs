@@ -1,13 +1,13 @@
 //! The generator's own fit of an effect: what a drive can show of it, before any diagnosis.
 //!
 //! Beside the car at work drive copies of it that are put onto its state every half second and get the same commands: one
-//! without the effect, four with other tires, two with other start states, one without the background. What they report
-//! differs from the car's reports by the response `e` of the effect, `T` of the tires, `S` of the start states, `m` of the background. With
-//! `S` projected out window by window and the responses whitened by the sensors' noise, weighted least squares with the
-//! tires known to [`TIRE_TRUST`] gives
+//! without the effect, four with other tires, one without each part of the background and one without any, two with other start states.
+//! What they report differs from the car's reports by the response `e` of the effect, `T` of the tires, `B` of the parts of the
+//! background, `m` of all of it, `S` of the start states. With `S` projected out window by window and the responses whitened by the
+//! sensors' noise, weighted least squares with the tires known to [`TIRE_TRUST`] and the background to `BACKGROUND_TRUST` gives
 //!
 //! ```text
-//! [a, t] = N^-1 [e, T]' y,    N = [e, T]'[e, T] + diag(0, 1/trust^2)
+//! [a, t, b] = N^-1 [e, T, B]' y,    N = [e, T, B]'[e, T, B] + diag(0, 1/trust^2)
 //! standard error of a: noise (white and coloured) and the scatter of the background's contribution over windows
 //! size ratio: 1 + a(m), the noise-free best fit over the mechanism's size; severity: 1/(5 standard errors)
 //! ```
@@ -28,6 +28,8 @@ use crate::label::OracleFit;
 
 /// Standard deviation with which peak and stiffness of the tires are known.
 pub const TIRE_TRUST: f64 = 0.03;
+/// Standard deviation of every part of the background as a share of what the car has of it: nobody has measured it.
+const BACKGROUND_TRUST: f64 = 1.0;
 
 const WINDOW: usize = 50;
 const SAMPLE_STEPS: u64 = 10;
@@ -75,6 +77,10 @@ pub fn oracle_fits(
         change(&mut copy.car);
         copies.push(exact(copy)?);
     }
+    let parts: Vec<&str> = bare.effects.iter().map(|e| e.name.as_str()).collect();
+    for part in &parts {
+        copies.push(exact(without(&|name| names.contains(&name) || name == *part))?);
+    }
     for name in &names {
         copies.push(exact(without(&|other| other == *name))?);
     }
@@ -84,7 +90,7 @@ pub fn oracle_fits(
         copies.push(exact(copy.effect(stand_in.clone()))?);
     }
     let reports = drive_beside(exact(scenario.clone())?, copies);
-    Ok(fits(scenario, &reports, asked.len()))
+    Ok(fits(scenario, &reports, asked.len(), parts.len()))
 }
 
 const TIRE_CHANGES: [fn(&mut CarParameters); TIRES] = [
@@ -170,14 +176,14 @@ fn noise(scenario: &Scenario, mean_speed_mps: f64) -> [[f64; CHANNELS]; 2] {
     ]
 }
 
-/// A window's whitened responses, what start states imitate taken out: the effects, the tires, the background.
+/// A window's whitened responses, what start states imitate taken out: the effects, the tires, the parts of the background; all of the background; stand-ins.
 struct Window {
     responses: DMatrix<f64>,
     background: DVector<f64>,
     stand_ins: Vec<DVector<f64>>,
 }
 
-fn fits(scenario: &Scenario, reports: &[Vec<Report>], effects: usize) -> Vec<OracleFit> {
+fn fits(scenario: &Scenario, reports: &[Vec<Report>], effects: usize, parts: usize) -> Vec<OracleFit> {
     let samples = reports.iter().map(Vec::len).min().unwrap_or(0);
     let [car, bare, ..] = reports else { return Vec::new() };
     let mean_speed_mps = bare.iter().map(|r| r[2]).sum::<f64>() / samples.max(1) as f64;
@@ -187,23 +193,27 @@ fn fits(scenario: &Scenario, reports: &[Vec<Report>], effects: usize) -> Vec<Ora
             let column = |a: &[Report], b: &[Report], step: f64| {
                 whitened(&a[w * WINDOW..(w + 1) * WINDOW], &b[w * WINDOW..(w + 1) * WINDOW], step, &white)
             };
-            // In the order of `oracle_fits`: bare, two starts, no background, the tires, each effect left out.
+            // In the order of `oracle_fits`: bare, two starts, no background, the tires, each part of the background and each effect left out.
             let starts = [2, 3].map(|i| column(&reports[i], bare, 1.0));
             let starts = orthonormal(starts);
             let tires = (5..5 + TIRES).map(|i| column(&reports[i], bare, TIRE_STEP));
-            let left_out = (5 + TIRES..5 + TIRES + effects).map(|i| column(car, &reports[i], 1.0));
-            let stand_ins = reports.iter().skip(5 + TIRES + effects);
+            let parts_from = 5 + TIRES;
+            let effects_from = parts_from + parts;
+            let parts = (parts_from..effects_from).map(|i| column(bare, &reports[i], 1.0));
+            let left_out = (effects_from..effects_from + effects).map(|i| column(car, &reports[i], 1.0));
+            let stand_ins = reports.iter().skip(effects_from + effects);
             let stand_ins = stand_ins.map(|r| without_starts(column(r, bare, 1.0), &starts)).collect();
             let columns: Vec<DVector<f64>> =
-                left_out.chain(tires).map(|c| without_starts(c, &starts)).collect();
+                left_out.chain(tires).chain(parts).map(|c| without_starts(c, &starts)).collect();
             let background = without_starts(column(bare, &reports[4], 1.0), &starts);
             Window { responses: DMatrix::from_columns(&columns), background, stand_ins }
         })
         .collect();
+    let trusts: Vec<f64> = [TIRE_TRUST; TIRES].into_iter().chain(vec![BACKGROUND_TRUST; parts]).collect();
     let mut fits: Vec<OracleFit> =
-        (0..effects).map(|effect| fit(&windows, effects, effect, &white, &coloured)).collect();
+        (0..effects).map(|effect| fit(&windows, effect, &trusts, &white, &coloured)).collect();
     if let Some(first) = fits.first_mut() {
-        first.excess_without = excess(&windows, effects);
+        first.excess_without = excess(&windows, effects, &trusts);
     }
     fits
 }
@@ -238,15 +248,16 @@ fn without_starts(mut column: DVector<f64>, starts: &[DVector<f64>; 2]) -> DVect
 
 fn fit(
     windows: &[Window],
-    effects: usize,
     effect: usize,
+    trusts: &[f64],
     white: &[f64; CHANNELS],
     coloured: &[f64; CHANNELS],
 ) -> OracleFit {
     let nothing = OracleFit { severity: 0.0, size_ratio: 1.0, chi2_per_residual: 0.0, excess_without: None };
-    let mut information = DMatrix::zeros(effects + TIRES, effects + TIRES);
-    for i in effects..effects + TIRES {
-        information[(i, i)] = TIRE_TRUST.powi(-2);
+    let all = windows.first().map_or(0, |w| w.responses.ncols());
+    let mut information = DMatrix::zeros(all, all);
+    for (i, trust) in (all.saturating_sub(trusts.len())..all).zip(trusts) {
+        information[(i, i)] = trust.powi(-2);
     }
     for window in windows {
         information += window.responses.tr_mul(&window.responses);
@@ -281,21 +292,22 @@ fn fit(
 }
 
 /// What the best stand-in, with other tires, leaves of the first effect's response: squared, over the noise, per residual.
-fn excess(windows: &[Window], effects: usize) -> Option<f64> {
+fn excess(windows: &[Window], effects: usize, trusts: &[f64]) -> Option<f64> {
     let stand_ins = windows.first()?.stand_ins.len();
     let residuals = (windows.len() * WINDOW * CHANNELS) as f64;
     let left = (0..stand_ins).map(|s| {
-        let mut information = DMatrix::zeros(1 + TIRES, 1 + TIRES);
-        for i in 1..=TIRES {
-            information[(i, i)] = TIRE_TRUST.powi(-2);
+        let columns = 1 + trusts.len();
+        let mut information = DMatrix::zeros(columns, columns);
+        for (i, trust) in (1..).zip(trusts) {
+            information[(i, i)] = trust.powi(-2);
         }
-        let (mut moment, mut whole) = (DVector::zeros(1 + TIRES), 0.0);
+        let (mut moment, mut whole) = (DVector::zeros(columns), 0.0);
         for window in windows {
             let response = window.responses.column(0);
-            let mut columns = window.responses.columns(effects - 1, 1 + TIRES).clone_owned();
-            columns.set_column(0, &window.stand_ins[s]);
-            information += columns.tr_mul(&columns);
-            moment += columns.tr_mul(&response);
+            let mut beside = window.responses.columns(effects - 1, columns).clone_owned();
+            beside.set_column(0, &window.stand_ins[s]);
+            information += beside.tr_mul(&beside);
+            moment += beside.tr_mul(&response);
             whole += response.norm_squared();
         }
         // Both columns may be nought: an effect that this drive does not excite at all.

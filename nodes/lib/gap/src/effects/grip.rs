@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectSpec, Need, ParameterSpec, both_sides, spec};
+use super::{Effect, EffectId, EffectSpec, Need, ParameterSpec, both_sides, spec};
 use crate::terms::{Axles, Car, Moment};
 
 /// The grip factor never falls below this.
@@ -40,6 +40,7 @@ pub(super) struct GripScale;
 
 impl Effect for GripScale {
     const SPEC: EffectSpec = EffectSpec {
+        alike: &[EffectId::GripBalance],
         needs: &[Need::ReferenceTires],
         ..spec(
             "grip_scale",
@@ -61,6 +62,7 @@ pub(super) struct GripBalance;
 
 impl Effect for GripBalance {
     const SPEC: EffectSpec = EffectSpec {
+        alike: &[EffectId::GripScale],
         needs: &[Need::ReferenceTires],
         ..spec(
             "grip_balance",

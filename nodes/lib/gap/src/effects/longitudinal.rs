@@ -3,7 +3,7 @@
 use gripsight_vehicle::{GRAVITY_MPS2, Real};
 
 use super::loads::COMMAND;
-use super::{Effect, EffectSpec, ParameterSpec, spec};
+use super::{Effect, EffectId, EffectSpec, ParameterSpec, spec};
 use crate::terms::{Car, Moment, Motion};
 
 /// Drag of the air.
@@ -12,6 +12,7 @@ pub(super) struct AeroDrag;
 
 impl Effect for AeroDrag {
     const SPEC: EffectSpec = EffectSpec {
+        alike: &[EffectId::RollingResistance],
         needs: COMMAND,
         ..spec(
             "aero_drag",
@@ -33,6 +34,7 @@ pub(super) struct RollingResistance;
 
 impl Effect for RollingResistance {
     const SPEC: EffectSpec = EffectSpec {
+        alike: &[EffectId::AeroDrag],
         needs: COMMAND,
         ..spec(
             "rolling_resistance",

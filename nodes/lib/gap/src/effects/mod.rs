@@ -12,7 +12,7 @@
 //!    * [`Effect::sense`]: from the car's motion to the recorded signals.
 //! 2. Write the equation for any [`Real`]; with the parameters at their null value it must leave everything exactly as it was
 //!    (multiply by 1, add 0), and its derivative there should not vanish, or the screening cannot see it (set `starts` else).
-//! 3. Add the type to the list at the end of this file. The test `null_values_leave_the_nominal_model` takes it up by itself.
+//! 3. Add the type to the list at the end of this file, and its place to `EffectId::room` where it is not among the lateral forces. The test `null_values_leave_the_nominal_model` takes it up by itself.
 
 mod chassis;
 mod grip;
@@ -26,6 +26,7 @@ mod tire;
 use gripsight_vehicle::Real;
 
 use crate::GapError;
+use crate::flexible::Room;
 use crate::terms::{Axles, Car, Moment, Motion, Outputs};
 
 /// What must be recorded for an effect to show.
@@ -103,6 +104,9 @@ pub struct EffectSpec {
     pub starts: &'static [f64],
     /// Whether its derivative vanishes at the null value, so that screening must look at its first start instead.
     pub flat_at_null: bool,
+    /// Effects that do nearly the same to the signals: only a fit of both tells which it is. Where such a one is not among the candidates
+    /// (left out, or invisible), it shares the name.
+    pub alike: &'static [EffectId],
 }
 
 /// An effect. See the module's text.
@@ -249,6 +253,31 @@ impl EffectId {
         matches!(self, Self::LowGripPatch | Self::RoadBank | Self::RoadSlope)
     }
 
+    /// Where it sits: whose free terms can do what it does.
+    pub(crate) fn room(self) -> Room {
+        match self {
+            Self::SteeringLag
+            | Self::SteeringDelay
+            | Self::SteeringGain
+            | Self::SteeringOffset
+            | Self::SteeringBacklash
+            | Self::SteeringRateLimit
+            | Self::ComplianceSteer => Room::Steering,
+            Self::VyLeverArm
+            | Self::VyBias
+            | Self::OdometryDelay
+            | Self::OdometryLowPass
+            | Self::VxScale
+            | Self::ImuLeverArm
+            | Self::ImuTilt
+            | Self::GyroScale
+            | Self::GyroBias => Room::Sensors,
+            Self::AeroDrag | Self::RollingResistance | Self::MassError => Room::Drive,
+            Self::LowGripPatch | Self::RoadBank | Self::RoadSlope => Room::Outside,
+            _ => Room::Forces,
+        }
+    }
+
     /// How many of its parameters, the first ones, size it; later ones place or shape it.
     pub(crate) fn sizing(self) -> usize {
         match self {
@@ -292,6 +321,7 @@ const fn spec(
         reported: &[],
         starts: &[0.0],
         flat_at_null: false,
+        alike: &[],
     }
 }
 

@@ -4,7 +4,7 @@
 use gripsight_vehicle::{GRAVITY_MPS2, Real};
 
 use super::loads::COMMAND;
-use super::{Effect, EffectSpec, Reported, both_sides, spec};
+use super::{Effect, EffectId, EffectSpec, Reported, both_sides, spec};
 use crate::terms::{Axles, Car, Moment, Motion};
 
 /// The angle at a place.
@@ -29,6 +29,7 @@ pub(super) struct RoadBank;
 
 impl Effect for RoadBank {
     const SPEC: EffectSpec = EffectSpec {
+        alike: &[EffectId::ImuTilt],
         reported: &[Reported { name: "angle_rad", unit: "rad", value: extreme }],
         ..spec(
             "road_bank",

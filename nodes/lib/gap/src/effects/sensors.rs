@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::{GRAVITY_MPS2, Real};
 
-use super::{Effect, EffectSpec, Need, both_sides, positive, spec};
+use super::{Effect, EffectId, EffectSpec, Need, both_sides, positive, spec};
 use crate::terms::{Car, Lag, Outputs, delayed};
 
 const ACCELEROMETER: &[Need] = &[Need::Accelerometer];
@@ -93,6 +93,7 @@ pub(super) struct OdometryDelay;
 
 impl Effect for OdometryDelay {
     const SPEC: EffectSpec = EffectSpec {
+        alike: &[EffectId::OdometryLowPass],
         starts: &[0.5],
         ..spec(
             "odometry_delay",
@@ -114,6 +115,7 @@ pub(super) struct OdometryLowPass;
 
 impl Effect for OdometryLowPass {
     const SPEC: EffectSpec = EffectSpec {
+        alike: &[EffectId::OdometryDelay],
         starts: &[0.5],
         ..spec(
             "odometry_low_pass",
@@ -194,6 +196,7 @@ pub(super) struct ImuTilt;
 
 impl Effect for ImuTilt {
     const SPEC: EffectSpec = EffectSpec {
+        alike: &[EffectId::RoadBank],
         needs: ACCELEROMETER,
         ..spec(
             "imu_tilt",

@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectSpec, ParameterSpec, Reported, both_sides, positive, spec};
+use super::{Effect, EffectId, EffectSpec, ParameterSpec, Reported, both_sides, positive, spec};
 use crate::terms::delayed;
 
 /// The wheels follow the command through a servo: a lag of second order.
@@ -14,6 +14,7 @@ const SHORT_LAG: f64 = 1.0 / 30.0;
 
 impl Effect for SteeringLag {
     const SPEC: EffectSpec = EffectSpec {
+        alike: &[EffectId::SteeringDelay, EffectId::TireRelaxation],
         starts: &[0.5, 0.15],
         ..spec(
             "steering_lag",
@@ -90,6 +91,7 @@ pub(super) struct SteeringDelay;
 
 impl Effect for SteeringDelay {
     const SPEC: EffectSpec = EffectSpec {
+        alike: &[EffectId::SteeringLag, EffectId::TireRelaxation],
         starts: &[0.5, 1.5],
         ..spec(
             "steering_delay",

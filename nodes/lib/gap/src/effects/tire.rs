@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::{GRAVITY_MPS2, Real};
 
-use super::{Effect, EffectSpec, Reported, positive, spec};
+use super::{Effect, EffectId, EffectSpec, Reported, positive, spec};
 use crate::terms::{Axles, Car, Moment};
 
 /// The side force follows the slip angle with a lag of one relaxation length.
@@ -11,6 +11,7 @@ pub(super) struct TireRelaxation;
 
 impl Effect for TireRelaxation {
     const SPEC: EffectSpec = EffectSpec {
+        alike: &[EffectId::SteeringDelay, EffectId::SteeringLag],
         starts: &[0.5, 0.15],
         ..spec(
             "tire_relaxation",
