@@ -24,6 +24,7 @@ use gripsight_reference_car::{
 use nalgebra::{DMatrix, DVector};
 
 use crate::WithheldError;
+use crate::drive::MARGIN_S;
 use crate::label::OracleFit;
 
 /// Standard deviation with which peak and stiffness of the tires are known.
@@ -32,6 +33,8 @@ pub const TIRE_TRUST: f64 = 0.03;
 const BACKGROUND_TRUST: f64 = 1.0;
 
 const WINDOW: usize = 50;
+/// Reports come a hundred times a second.
+const WINDOW_S: f64 = 0.5;
 const SAMPLE_STEPS: u64 = 10;
 /// Step of the tires' peak and stiffness, relative.
 const TIRE_STEP: f64 = 0.02;
@@ -188,7 +191,11 @@ fn fits(scenario: &Scenario, reports: &[Vec<Report>], effects: usize, parts: usi
     let [car, bare, ..] = reports else { return Vec::new() };
     let mean_speed_mps = bare.iter().map(|r| r[2]).sum::<f64>() / samples.max(1) as f64;
     let [white, coloured] = noise(scenario, mean_speed_mps);
-    let windows: Vec<Window> = (0..samples / WINDOW)
+    // Of what is recorded alone: the first turn of the wheels, before the bag begins, shows nobody a slow servo.
+    let duration_s = scenario.duration_s;
+    let to = (((duration_s - MARGIN_S) / WINDOW_S) as usize).min(samples / WINDOW);
+    let from = ((MARGIN_S / WINDOW_S).ceil() as usize).min(to);
+    let windows: Vec<Window> = (from..to)
         .map(|w| {
             let column = |a: &[Report], b: &[Report], step: f64| {
                 whitened(&a[w * WINDOW..(w + 1) * WINDOW], &b[w * WINDOW..(w + 1) * WINDOW], step, &white)

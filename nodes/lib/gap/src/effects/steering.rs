@@ -14,7 +14,7 @@ const SHORT_LAG: f64 = 1.0 / 30.0;
 
 impl Effect for SteeringLag {
     const SPEC: EffectSpec = EffectSpec {
-        alike: &[EffectId::SteeringDelay, EffectId::TireRelaxation],
+        alike: &[EffectId::SteeringDelay, EffectId::TireRelaxation, EffectId::SteeringBacklash],
         starts: &[0.5, 0.15],
         ..spec(
             "steering_lag",
@@ -154,6 +154,7 @@ pub(super) struct SteeringBacklash;
 
 impl Effect for SteeringBacklash {
     const SPEC: EffectSpec = EffectSpec {
+        alike: &[EffectId::SteeringLag],
         starts: &[0.6, 1.8],
         ..spec(
             "steering_backlash",
