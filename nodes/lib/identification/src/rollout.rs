@@ -4,70 +4,30 @@
 //! the centre of gravity: F_y/F_z is the tires' own only with the load that was on them. And the slip that makes the force follows the slip of
 //! the axle over a relaxation length, d(alpha')/dt = (alpha - alpha') v_x/sigma: without it the lag of a real tire reads as stiffness, delay and lever arm.
 //! And driving and braking take from the lateral force along the friction ellipse, F_y sqrt(1 - (k F_x/(D F_z))^2), F_x from the acceleration and the
-//! known split of drive and brake; the front wheels' F_x pulls to the side that they are turned to.
+//! known split of drive and brake; the front wheels' F_x pulls to the side that they are turned to. That acceleration is what moves the car and what
+//! the turned front wheels brake: F_x = m a_x + F_yf sin d.
+//!
+//! The front wheel on the outside of a corner carries more load, gives more of F_yf, and so brakes more of it where it is turned by d:
+//! that turns the car out of the corner by (F_outer - F_inner) (t/2) sin d. Where both axles share the load transfer as they do the weight,
+//! F_outer - F_inner = F_yf (F_yf/F_zf) 2 h/t: the moment F_yf (F_yf/F_zf) h sin d needs neither the track width t nor a parameter. It is 0.95 to 1.2 times
+//! that in plants that have wheels, and 2 to 4 % of the moment of the rear axle.
 //!
 //! Relaxation length, k and the share of m a_x h/L that really is shifted (springs, and tires that gain less grip than load) are nuisances of the
 //! estimation, not results: Phi_p goes to models that have none of them.
 
+mod vector;
+
 use gripsight_signals::Segment;
-use gripsight_vehicle::{
-    GRAVITY_MPS2, Input, MagicFormula, PacejkaParameters, Real, SingleTrack, State, VehicleParameters,
-};
+use gripsight_vehicle::{GRAVITY_MPS2, Input, MagicFormula, Real, SingleTrack, State, VehicleParameters};
 
-use serde::{Deserialize, Serialize};
-
-use crate::SignalCorrections;
 use crate::data::Data;
 use crate::shooting::{Rollout, Window};
 
-/// Number of parameters of [`TireRollout`]: (k, C, D, E) front and rear with k = B C D, the
-/// signal corrections, the tires' relaxation length, how much longitudinal force takes from the lateral, and how much of the
-/// load transfer is felt.
-pub(crate) const PARAMETERS: usize = 17;
-/// Place of the first signal correction.
-pub(crate) const SIGNALS: usize = 8;
-/// Place of the relaxation length.
-pub(crate) const RELAXATION: usize = 14;
-/// Place of the share of combined slip.
-pub(crate) const COMBINED: usize = 15;
-/// Place of the share of load transfer.
-pub(crate) const TRANSFER: usize = 16;
-/// Names of the parameters, with their units where they have one.
-pub(crate) const NAMES: [&str; PARAMETERS] = [
-    "front.k",
-    "front.c",
-    "front.d",
-    "front.e",
-    "rear.k",
-    "rear.c",
-    "rear.d",
-    "rear.e",
-    "steering_delay_s",
-    "steering_gain",
-    "steering_offset_rad",
-    "v_y_lever_arm_m",
-    "v_y_bias_mps",
-    "yaw_rate_bias_radps",
-    "relaxation_m",
-    "combined_slip",
-    "load_transfer",
-];
-
-/// What the estimation allows for and Phi_p does not hold.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Nuisance {
-    /// Relaxation length of the tires.
-    pub relaxation_m: f64,
-    /// How much of the friction ellipse is at work: 0 none, 1 all.
-    pub combined_slip: f64,
-    /// Share of the longitudinal load transfer that the tires feel: 0 none, 1 that of a rigid car on tires without load sensitivity.
-    pub load_transfer: f64,
-}
-
-/// Nuisances of a parameter vector.
-pub(crate) fn nuisance_of(p: &[f64]) -> Nuisance {
-    Nuisance { relaxation_m: p[RELAXATION], combined_slip: p[COMBINED], load_transfer: p[TRANSFER] }
-}
+pub use vector::Nuisance;
+pub(crate) use vector::{
+    COMBINED, NAMES, PARAMETERS, RELAXATION, SIGNALS, TRANSFER, corrections_of, nuisance_of, tires_of,
+    vector_of,
+};
 
 /// Predicts what the sensors report of v_y and yaw rate.
 #[derive(Debug, Clone, Copy)]
@@ -88,7 +48,7 @@ struct Drive<T> {
     /// Longitudinal over vertical force of either axle.
     pull: [T; 2],
     /// Longitudinal force of the front axle.
-    front_pull_n: f64,
+    front_pull_n: T,
 }
 
 /// What a rollout shows at a sample.
@@ -156,13 +116,18 @@ impl<'a> TireRollout<'a> {
             let steering_rad =
                 delayed(&segment.steering_rad, k, delay_samples) * p[SIGNALS + 1] + p[SIGNALS + 2];
             let load = [least(-shifted_n / front_n + 1.0), least(shifted_n / rear_n + 1.0)];
-            let force_n = self.vehicle.mass_kg * self.a_x_mps2[window.segment][k];
-            let front =
-                if force_n > 0.0 { self.vehicle.drive_front_share } else { self.vehicle.brake_front_share };
-            let front_pull_n = front * force_n;
+            // What the tires give along the car: also what the turned front wheels brake.
+            let across_mps2 = self.vehicle.l_r_m / self.vehicle.wheelbase_m()
+                * segment.v_x_mps[k]
+                * segment.yaw_rate_radps[k];
+            let force_n =
+                (steering_rad.sin() * across_mps2 + self.a_x_mps2[window.segment][k]) * self.vehicle.mass_kg;
+            let driving = force_n.re() > 0.0;
+            let front = if driving { self.vehicle.drive_front_share } else { self.vehicle.brake_front_share };
+            let front_pull_n = force_n * front;
             let pull = [
-                load[0].recip() * (front_pull_n / front_n),
-                load[1].recip() * ((force_n - front_pull_n) / rear_n),
+                load[0].recip() * front_pull_n * (1.0 / front_n),
+                load[1].recip() * force_n * ((1.0 - front) / rear_n),
             ];
             Drive { v_x_mps: segment.v_x_mps[k], steering_rad, load, pull, front_pull_n }
         };
@@ -220,16 +185,20 @@ impl<'a> TireRollout<'a> {
         let static_n = [v.static_load_front_n(), v.static_load_rear_n()];
         let loads_n = [static_n[0] * drive.load[0].re(), static_n[1] * drive.load[1].re()];
         let (sin, cos) = drive.steering_rad.re().sin_cos();
-        let (across_n, along_n) = (front.re() * loads_n[0], drive.front_pull_n);
+        let (across_n, along_n) = (front.re() * loads_n[0], drive.front_pull_n.re());
         let (front_n, rear_n) = (across_n * cos + along_n * sin, rear.re() * loads_n[1]);
-        // The same line for v_y and yaw rate: what a newton at the front and one at the rear do.
-        let rate = |value: f64, by_front: f64, by_rear: f64, by_yaw_rate: f64| {
+        let drag_m = v.h_cg_m * front.re();
+        // The same line for v_y and yaw rate: what a newton at the front and one at the rear do, and what the front wheels' drag does.
+        let rate = |value: f64, by_front: f64, by_drag: f64, by_rear: f64, by_yaw_rate: f64| {
+            let slope = by_front * cos - by_drag * drag_m * sin;
+            let turned = by_front * (along_n * cos - across_n * sin) - by_drag * drag_m * across_n * cos;
             T::chain(
                 value,
                 [
-                    (by_front * loads_n[0] * cos, &front),
-                    (by_front * front.re() * static_n[0] * cos, &drive.load[0]),
-                    (by_front * (along_n * cos - across_n * sin), &drive.steering_rad),
+                    (loads_n[0] * (slope - by_drag * drag_m * sin), &front),
+                    (static_n[0] * front.re() * slope, &drive.load[0]),
+                    (turned, &drive.steering_rad),
+                    (by_front * sin, &drive.front_pull_n),
                     (by_rear * loads_n[1], &rear),
                     (by_rear * rear.re() * static_n[1], &drive.load[1]),
                     (by_yaw_rate, &x.yaw_rate_radps),
@@ -241,12 +210,14 @@ impl<'a> TireRollout<'a> {
             v_y_mps: rate(
                 (rear_n + front_n) / mass_kg - drive.v_x_mps * x.yaw_rate_radps.re(),
                 1.0 / mass_kg,
+                0.0,
                 1.0 / mass_kg,
                 -drive.v_x_mps,
             ),
             yaw_rate_radps: rate(
-                (front_n * v.l_f_m - rear_n * v.l_r_m) / inertia_kgm2,
+                (front_n * v.l_f_m - across_n * drag_m * sin - rear_n * v.l_r_m) / inertia_kgm2,
                 v.l_f_m / inertia_kgm2,
+                1.0 / inertia_kgm2,
                 -v.l_r_m / inertia_kgm2,
                 0.0,
             ),
@@ -265,7 +236,7 @@ impl<T: Real> Drive<T> {
             steering_rad: between(&self.steering_rad, &next.steering_rad, T::from(share)),
             load: std::array::from_fn(|i| self.load[i] + (next.load[i] - self.load[i]) * share),
             pull: std::array::from_fn(|i| self.pull[i] + (next.pull[i] - self.pull[i]) * share),
-            front_pull_n: self.front_pull_n + (next.front_pull_n - self.front_pull_n) * share,
+            front_pull_n: between(&self.front_pull_n, &next.front_pull_n, T::from(share)),
         }
     }
 }
@@ -282,35 +253,6 @@ fn moved<T: Real>(x: &State<T>, slope: &State<T>, h_s: f64) -> State<T> {
         v_y_mps: along(&x.v_y_mps, &slope.v_y_mps),
         yaw_rate_radps: along(&x.yaw_rate_radps, &slope.yaw_rate_radps),
     }
-}
-
-/// Tires of a parameter vector.
-pub(crate) fn tires_of<T: Real>(p: &[T]) -> PacejkaParameters<T> {
-    let axle = |v: &[T]| MagicFormula { b: v[0] / (v[1] * v[2]), c: v[1], d: v[2], e: v[3] };
-    PacejkaParameters { front: axle(&p[..4]), rear: axle(&p[4..8]) }
-}
-
-/// The parameter vector of tires and corrections.
-pub(crate) fn vector_of(
-    tires: &PacejkaParameters,
-    corrections: &SignalCorrections,
-    nuisance: &Nuisance,
-) -> [f64; PARAMETERS] {
-    let axle = |f: &MagicFormula| [f.normalized_stiffness(), f.c, f.d, f.e];
-    let (front, rear, signals) = (axle(&tires.front), axle(&tires.rear), corrections.to_array());
-    std::array::from_fn(|j| match j {
-        0..4 => front[j],
-        4..8 => rear[j - 4],
-        RELAXATION => nuisance.relaxation_m,
-        COMBINED => nuisance.combined_slip,
-        TRANSFER => nuisance.load_transfer,
-        _ => signals[j - SIGNALS],
-    })
-}
-
-/// Signal corrections of a parameter vector.
-pub(crate) fn corrections_of(p: &[f64]) -> SignalCorrections {
-    SignalCorrections::from_array(std::array::from_fn(|j| p[SIGNALS + j]))
 }
 
 /// The recorded steering at sample `k` less a delay; held before the first sample.
@@ -360,3 +302,6 @@ impl Rollout for TireRollout<'_> {
         [segment.v_y_mps[window.from], segment.yaw_rate_radps[window.from]]
     }
 }
+
+#[cfg(test)]
+mod tests;
