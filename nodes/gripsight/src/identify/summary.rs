@@ -86,7 +86,7 @@ fn tires(text: &mut String, result: &Outcome) {
 fn signals(text: &mut String, result: &Outcome) {
     let s = &result.signal_intervals;
     let rows = [
-        ("delay and lag s", "steering_delay_s", s.steering_delay_s),
+        ("steering delay and lag s", "steering_delay_s", s.steering_delay_s),
         ("steering gain", "steering_gain", s.steering_gain),
         ("steering offset rad", "steering_offset_rad", s.steering_offset_rad),
         ("v_y ahead of the CoG m", "v_y_lever_arm_m", s.v_y_lever_arm_m),

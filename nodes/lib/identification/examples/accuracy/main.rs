@@ -3,7 +3,8 @@
 //! ```text
 //! accuracy reference FIRST_SEED            drives of the reference car, whose seeds count up from the first
 //! accuracy bags FOLDER...                  bag folders with `truth_axle_forces.csv`
-//! accuracy draws FROM TO DURATION_S [OFF]  drives drawn from seeds: what intervals, and claims of a peak, are worth; with a prior OFF from the road's mu
+//! accuracy draws FROM TO DURATION_S [OFF SIGMA]
+//!                                          drives drawn from seeds: what intervals, and claims of a peak, are worth; with a prior OFF from the road's mu
 //! accuracy robustness                      one drive under worse and worse recording, and from other starts and priors
 //! ```
 //!
@@ -134,13 +135,16 @@ fn main() -> Result<()> {
                 println!("{}", row(&run, PLAIN, None, &Config::default())?);
             }
         }
-        ("draws", [from, to, duration_s, off @ ..]) => {
-            let off = off.first().map(|off| off.parse::<f64>()).transpose()?;
+        ("draws", [from, to, duration_s, prior @ ..]) => {
+            let off = match prior {
+                [off, sigma] => Some((off.parse::<f64>()?, sigma.parse()?)),
+                _ => None,
+            };
             let config = Config { residual: ResidualKind::None, ..Config::default() };
             for seed in from.parse()?..to.parse()? {
                 let case = cases::draw(seed, duration_s.parse()?)?;
                 let road = case.scenario.friction.nominal();
-                let prior = off.map(|off| FrictionPrior { mu: (road + off).max(0.1), sigma: 0.1 });
+                let prior = off.map(|(off, sigma)| FrictionPrior { mu: (road + off).max(0.1), sigma });
                 let (recording, sequence, vehicle) = reference::drive(case.scenario);
                 let truth = truth_of(&recording, &vehicle);
                 let run = Run { name: case.name, vehicle, sequence, truth };

@@ -41,7 +41,7 @@ pub(super) fn tires(outcome: &Outcome) -> Markup {
 pub(super) fn signals(outcome: &Outcome) -> Markup {
     let s = &outcome.signal_intervals;
     let rows = [
-        ("Steering delay / s", "steering_delay_s", s.steering_delay_s),
+        ("Steering delay and lag / s", "steering_delay_s", s.steering_delay_s),
         ("Steering gain", "steering_gain", s.steering_gain),
         ("Steering offset / rad", "steering_offset_rad", s.steering_offset_rad),
         ("v_y measured ahead of the CoG / m", "v_y_lever_arm_m", s.v_y_lever_arm_m),
