@@ -83,10 +83,13 @@ fn a_peer_s_pictures_are_read_and_broken_ones_refused() {
     let Some([library, model]) = engine() else { return };
     let domain = Domain::new();
     let listener = listen(&domain, &python, FRICTION, FrictionPrior::TYPE, "reliable");
+    let onlooker =
+        listen(&domain, &python, "/camera_prior/region/compressed", CompressedImage::TYPE, "reliable");
     // The peer starts to send once it has found the node, so its stamps may be old, and the second is ahead by one.
     let age = ["-p", "most_age_s:=60.0", "-p", "most_ahead_s:=5.0"];
     let files = ["-p", &library, "-p", &model];
-    let _node = node(&domain, "camera_prior", &[&age[..], &files].concat());
+    let region = ["-p", "publish_region:=true", "-p", "region:=[0.1, 0.3, 0.9, 0.95]"];
+    let _node = node(&domain, "camera_prior", &[&age[..], &files, &region].concat());
     let topic = ["publish", "/image/compressed", CompressedImage::TYPE, "--qos", "sensor", "--period", "1"];
     let mut peer = start_cyclone(&domain, &python, &topic);
     let jpeg = road("road.png");
@@ -100,6 +103,11 @@ fn a_peer_s_pictures_are_read_and_broken_ones_refused() {
     );
     let expected: f64 = read.probability.iter().zip(&read.class_mu).map(|(p, mu)| p * mu).sum();
     assert!((read.mu - expected).abs() < 1e-9 && read.sigma > 0.0, "{read:?}");
+
+    // What the network saw: the region, at its own size.
+    let seen: CompressedImage = message(&onlooker);
+    let picture = image::load_from_memory(&seen.data).unwrap();
+    assert_eq!((picture.width(), picture.height(), seen.header.frame_id.as_str()), (224, 224, "camera"));
 
     let refused = prior(&listener, |p| p.reason != "no_picture");
     assert!(!refused.valid, "{refused:?}");
