@@ -12,15 +12,17 @@
 //!    that is left is put up against all others once more, with the rest of the model in place ([`Look`]).
 //! 4. What the retuned tires and the effects leave is looked at room by room ([`Unexplained`]): steering, sensors, lateral and longitudinal
 //!    forces, road and wind each have free terms (impulse responses, curves, places) that can do roughly what any cause there does. An effect
-//!    that is the cause leaves them nothing; a stand-in does. How much they explain over what the effect explains, what is left
-//!    on held-out data, its size and its twins give its confidence by a logistic regression; below even odds an effect is a candidate, not a name. Where nothing is named,
+//!    that is the cause leaves them nothing; a stand-in does. How much they explain over what the effect explains, how far its size drifts
+//!    between this and held-out data and between parts of this, what its own room still finds, its size and its twins give the chance that
+//!    it is the cause by a logistic regression; below even odds an effect is a candidate, not a name. Effects that do nearly the same are
+//!    declared ([`EffectSpec::alike`]): where such a one is not among the candidates, name and chance are shared. Where nothing is named,
 //!    what the rooms explain tells "none of these" from a retune.
 //! 5. Open-loop rollouts of 1 s on held-out blocks (or another bag): nominal, retuned, with the effects, with all free terms on top (the
 //!    ceiling), with the residual network of `gripsight_s4` in place of effects, against the noise. Effects that reach too little of the ceiling
 //!    are not named.
 //!
 //! Intervals of sizes use blocks of 4 s as clusters and add a share of the size for errors of the model that all blocks share; that
-//! share, and all thresholds (`select::thresholds`, `verdict`), were fixed on development drives of the reference car.
+//! share, and all thresholds (`select::thresholds`, `confidence`), were fixed on development drives of the reference car.
 //!
 //! # Adding an effect
 //!
@@ -50,6 +52,7 @@
 //! must leave the nominal model exactly as it was. If its derivative vanishes there, say `flat_at_null` and give `starts`.
 
 mod budget;
+mod confidence;
 mod correct;
 mod diagnose;
 mod effects;
@@ -65,7 +68,9 @@ mod noise;
 mod outcome;
 mod pictures;
 mod place;
+mod priors;
 mod recording;
+mod refit;
 mod residual;
 mod rooms;
 mod screen;

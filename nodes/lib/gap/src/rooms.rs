@@ -199,7 +199,7 @@ fn predicted(from: &Half, on: &Half, rows: &[usize], hold: &dyn Fn(usize) -> f64
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::recording::Recording;
     use crate::trust::TireTrust;
@@ -211,12 +211,12 @@ mod tests {
 
     const DT_S: f64 = 0.01;
 
-    fn tires() -> PacejkaParameters {
+    pub(crate) fn tires() -> PacejkaParameters {
         PacejkaParameters::from_array([7.0, 1.5, 1.0, 0.1, 8.0, 1.4, 0.95, -0.2])
     }
 
     /// The nominal car's drive over wheels that follow the recorded command with a time constant.
-    fn drive(vehicle: &VehicleParameters, lag_s: f64) -> Recording {
+    pub(crate) fn drive(vehicle: &VehicleParameters, lag_s: f64) -> Recording {
         const SAMPLES: usize = 2400;
         let car = SingleTrack::new(vehicle, &tires());
         let random = &mut rand_chacha::ChaCha8Rng::seed_from_u64(9);

@@ -2,7 +2,8 @@
 
 use crate::effects::EffectId;
 use crate::engine::Engine;
-use crate::select::{Refit, Round, difference, needed, relative_size, reweigh, round, thresholds};
+use crate::refit::{Refit, difference, relative_size};
+use crate::select::{Round, needed, reweigh, round, thresholds};
 use crate::state::State;
 use crate::windows::Windows;
 

@@ -114,3 +114,40 @@ fn change(
     let step = -(&inverse * gradient)[0];
     (step.is_finite() && inverse[(0, 0)] >= 0.0 && inverse[(0, 0)].sqrt() < UNKNOWN).then_some(step)
 }
+
+#[cfg(test)]
+mod tests {
+    use gripsight_vehicle::VehicleParameters;
+
+    use super::*;
+    use crate::rooms::tests::{drive, tires};
+    use crate::trust::TireTrust;
+    use crate::windows::split;
+
+    #[test]
+    fn a_cause_has_one_size_and_a_stand_in_has_several() {
+        const LAG_S: f64 = 0.06;
+        let vehicle = VehicleParameters::f1tenth();
+        let [recording, other] = [LAG_S, LAG_S].map(|lag_s| drive(&vehicle, lag_s));
+        let [slower] = [0.5 * LAG_S].map(|lag_s| drive(&vehicle, lag_s));
+        let drift = |effect: EffectId, start: f64, other: &crate::recording::Recording| {
+            let windows = split(&recording, false).training;
+            let engine = Engine::new(&recording, &vehicle, tires(), TireTrust::file());
+            let null = engine.fit(&[], &engine.blank(), None, &windows, 15);
+            let mut values = engine.carry(&null, &[effect]);
+            let first = values.len() - effect.spec().parameters.len();
+            values[first] = start;
+            let state = engine.fit(&[effect], &values, Some(null.starts), &windows, 15);
+            let there = Engine { recording: other, ..engine.clone() };
+            let apart = Some((&there, split(other, false).training));
+            drifts(&engine, &state, &windows, apart)[0]
+        };
+        let cause = drift(EffectId::SteeringLag, 0.03, &other);
+        assert!(cause < 0.1, "{cause}");
+        let stand_in = drift(EffectId::TireRelaxation, 0.1, &other);
+        assert!(stand_in > 2.0 * cause, "{stand_in} {cause}");
+        // Half the lag on the other drive is a change by half of the size.
+        let changed = drift(EffectId::SteeringLag, 0.03, &slower);
+        assert!((0.35..0.75).contains(&changed), "{changed}");
+    }
+}

@@ -1,6 +1,7 @@
 //! From figures to words: verdict, ranking, confidence, what to drive next.
 
 use crate::budget::Budget;
+use crate::confidence::{LEAST_CHANCE, Signs};
 use crate::effects::EffectId;
 use crate::engine::Engine;
 use crate::evaluate::mean;
@@ -14,8 +15,6 @@ use crate::state::State;
 
 /// Held-out error of the retuned over that of the nominal model from which it is worth a word.
 const WORSE: f64 = 1.2;
-/// Chance, shared with what is alike and was not tried, from which an effect is named: below even odds it is a candidate.
-const LEAST_CHANCE: f64 = 0.5;
 /// Size over the size that matters below which a candidate is at its null: it is not listed.
 const LEAST_LISTED: f64 = 0.01;
 /// Where the noise is not known: share of what is left that flexible terms explain from which something is missing in the model, mean squared
@@ -36,6 +35,8 @@ pub(crate) struct Claim {
     confused: Vec<EffectId>,
     /// What does nearly the same and was not among the candidates.
     untried: Vec<EffectId>,
+    /// What speaks against naming it.
+    doubts: Vec<String>,
     /// Whether it is sure enough, and its size told well enough, to be named.
     pub(crate) named: bool,
 }
@@ -78,7 +79,8 @@ pub(crate) fn claims(
         };
         let named = signs.chance() >= LEAST_CHANCE && is_told(state, effect, &engine.absent(effect), blocks);
         confused.extend(&untried);
-        Claim { effect, confidence: signs.confidence(), confused, untried, named }
+        let doubts = if named { Vec::new() } else { signs.heavy_doubts() };
+        Claim { effect, confidence: signs.confidence(), confused, untried, doubts, named }
     };
     state.named.iter().zip(evidence).enumerate().map(claim).collect()
 }
@@ -115,8 +117,12 @@ pub(crate) fn decide(
         return (Verdict::Effects, reasons);
     }
     if let Some(best) = claims.first() {
+        let why = match best.doubts.as_slice() {
+            [] => "its size is not told well enough by these data".to_owned(),
+            doubts => doubts.join("; "),
+        };
         reasons.push(format!(
-            "the best effect, {}, is a candidate with confidence {:.2}: not sure enough, or not well enough told, to be named",
+            "the best effect, {}, is a candidate with confidence {:.2} and not named: {why}",
             best.effect.name(),
             best.confidence
         ));
@@ -233,63 +239,6 @@ fn confused(round: &Round, effect: EffectId) -> Vec<EffectId> {
         .collect()
 }
 
-/// What tells an effect that is the cause from one that stands in for it.
-#[derive(Debug, Clone, Copy)]
-struct Signs {
-    /// The most that the free terms of a room explain beside the effects found: a cause leaves them nothing, a stand-in does.
-    left: f64,
-    /// The same of the room that the effect sits in.
-    left_in_its_room: f64,
-    /// What the effect explains beside the others, per residual as well.
-    explained: f64,
-    /// How far its size drifts between data, as a share of it.
-    drift: f64,
-    /// Its size over the size that matters.
-    relative_size: f64,
-    /// How many effects the data cannot tell from it.
-    confused: usize,
-    /// How many effects do nearly the same and were not among the candidates.
-    untried: usize,
-}
-
-impl Signs {
-    /// Chance that the effect, or one of those alike that were not tried, is the cause: a logistic regression on the effects found in
-    /// development cases (true ones against those that stood in for others or for nothing), 2026-11-21; see tests/results/withheld.
-    fn chance(self) -> f64 {
-        const ODDS: f64 = -3.93;
-        const PER_LOG_SHARE: f64 = 0.85;
-        const PER_LOG_DRIFT: f64 = 1.68;
-        const PER_LEFT: f64 = 0.46;
-        const PER_LEFT_UNTRIED: f64 = 2.17;
-        const PER_SIZE: f64 = 1.54;
-        const PER_TWIN: f64 = 0.73;
-        /// Share of what the effect explains, and drift, below which no more is learned.
-        const LEAST_SHARE: f64 = 0.01;
-        const LEAST_DRIFT: f64 = 0.05;
-        /// Size over the size that matters from which an effect is large.
-        const LARGE: f64 = 2.0;
-        const LEAST_EXPLAINED: f64 = 1e-3;
-        const MOST: f64 = 0.97;
-        // What an effect's own room may explain beside it, in steps of so much, up to so many; less where one that is alike was not tried.
-        let steps = |usual: f64, step: f64| ((self.left_in_its_room - usual) / step).clamp(0.0, 3.0);
-        let untried = if self.untried > 0 { steps(0.02, 0.03) } else { 0.0 };
-        let share = self.left / self.explained.max(LEAST_EXPLAINED);
-        let odds = ODDS
-            - PER_LOG_SHARE * (share + LEAST_SHARE).ln()
-            - PER_LOG_DRIFT * (self.drift + LEAST_DRIFT).ln()
-            - PER_LEFT * steps(0.03, 0.05)
-            - PER_LEFT_UNTRIED * untried
-            - PER_SIZE * (self.relative_size - LARGE).max(0.0)
-            - PER_TWIN * self.confused as f64;
-        (1.0 + (-odds).exp()).recip().min(MOST)
-    }
-
-    /// Chance that it is the effect itself.
-    fn confidence(self) -> f64 {
-        self.chance() / (1 + self.untried) as f64
-    }
-}
-
 /// What would split the groups and sharpen what was not seen.
 pub(crate) fn drive_next(effects: &[RankedEffect]) -> Vec<String> {
     let mut out = Vec::new();
@@ -307,43 +256,4 @@ pub(crate) fn drive_next(effects: &[RankedEffect]) -> Vec<String> {
         ));
     }
     out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_effect_is_named_that_leaves_the_rooms_nothing_and_has_one_likely_size() {
-        let cause = Signs {
-            left: 0.01,
-            left_in_its_room: 0.0,
-            explained: 2.0,
-            drift: 0.05,
-            relative_size: 1.0,
-            confused: 0,
-            untried: 0,
-        };
-        let named = |signs: Signs| signs.chance() >= LEAST_CHANCE;
-        assert!(named(cause) && cause.confidence() > 0.9);
-        // Twins share the chance; they do not take the name.
-        let twin = Signs { confused: 1, ..cause };
-        assert!(named(twin) && twin.confidence() < cause.confidence());
-        // What is alike and was not tried shares the name, and is believed less where its room has something to explain.
-        let untried = Signs { untried: 1, ..cause };
-        assert!(named(untried) && untried.confidence() < 0.5);
-        assert!(named(Signs { left_in_its_room: 0.1, ..cause }));
-        assert!(!named(Signs { left_in_its_room: 0.1, ..untried }));
-        assert!(!named(Signs { left: 0.6, drift: 0.3, ..cause }));
-        assert!(!named(Signs { relative_size: 5.0, left: 0.1, ..cause }));
-        // The same leftovers beside an effect whose size carries over, and beside one whose size does not.
-        assert!(named(Signs { left: 0.2, ..cause }));
-        assert!(!named(Signs { left: 0.2, drift: 0.8, ..cause }));
-        // What hardly matters itself cannot be told from the rest.
-        assert!(!named(Signs { explained: 0.0, drift: 0.3, ..cause }));
-        // The chance is none too sure, and falls as more is left.
-        let chances: Vec<f64> =
-            [0.0, 0.02, 0.1, 0.5, 2.0].map(|left| Signs { left, ..cause }.chance()).to_vec();
-        assert!(chances[0] <= 0.97 && chances.windows(2).all(|w| w[0] >= w[1]), "{chances:?}");
-    }
 }
