@@ -250,7 +250,7 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// Why, in sentences.
     pub reasons: Vec<String>,
-    /// Effects, best first; those accepted come first, in the order in which they were found.
+    /// Effects: those accepted, in the order of what they gain, then candidates in the order of what each would close.
     pub effects: Vec<RankedEffect>,
     /// Effects that these signals cannot show.
     pub invisible: Vec<Invisible>,

@@ -22,6 +22,8 @@ const LEAST_LISTED: f64 = 0.01;
 const EXPLAINABLE: f64 = 0.2;
 const LARGE_ERROR: f64 = 4.0;
 const HUGE_COST: f64 = 4.0;
+/// Candidates at most that a drive to make sure is proposed for, where nothing is named.
+const MOST_TO_MAKE_SURE: usize = 2;
 /// Excess of the nominal over the retuned model that makes it a retune.
 const RETUNE_EXCESS: f64 = 0.1;
 
@@ -116,7 +118,7 @@ pub(crate) fn decide(
         }
         return (Verdict::Effects, reasons);
     }
-    if let Some(best) = claims.first() {
+    if let Some(best) = claims.iter().max_by(|a, b| a.confidence.total_cmp(&b.confidence)) {
         let why = match best.doubts.as_slice() {
             [] => "its size is not told well enough by these data".to_owned(),
             doubts => doubts.join("; "),
@@ -154,7 +156,8 @@ pub(crate) fn decide(
     (if retune { Verdict::TireRetuneOnly } else { Verdict::NoGap }, reasons)
 }
 
-/// The effects named, with their sizes in the `model` that holds no others, then the other candidates, with theirs in the search's last `state`.
+/// The effects named, with their sizes in the `model` that holds no others, then the other candidates by what each would close beside them,
+/// with theirs in the search's last `state`.
 pub(crate) fn rank(
     claims: &[Claim],
     [model, state]: [&State; 2],
@@ -191,6 +194,13 @@ pub(crate) fn rank(
             confused_with: Vec::new(),
         });
     }
+    // Candidates by what they would close; those of which nothing is known last.
+    let named = out.iter().take_while(|e| e.accepted).count();
+    let closes = |e: &RankedEffect| {
+        let share = e.gap_closed_fraction.value;
+        if share.is_nan() { f64::NEG_INFINITY } else { share }
+    };
+    out[named..].sort_by(|a, b| closes(b).total_cmp(&closes(a)));
     out
 }
 
@@ -254,6 +264,12 @@ pub(crate) fn drive_next(effects: &[RankedEffect]) -> Vec<String> {
             e.confused_with.join(", "),
             manoeuvres.join("; ")
         ));
+    }
+    if !effects.iter().any(|e| e.accepted) {
+        let candidates = effects.iter().filter(|e| e.confidence > 0.0).take(MOST_TO_MAKE_SURE);
+        for id in candidates.filter_map(|e| EffectId::by_name(e.name)) {
+            out.push(format!("to make sure of {}: {}", id.name(), id.spec().excitation));
+        }
     }
     out
 }

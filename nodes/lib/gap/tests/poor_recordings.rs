@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used)]
 
 mod common;
+#[path = "common/poor.rs"]
+mod poor;
 
 use std::sync::OnceLock;
 
@@ -22,19 +24,8 @@ fn recording() -> &'static StateSequence {
     })
 }
 
-/// Samples `kept` of the recording, on the channels that every car has.
 fn picked(kept: impl Fn(usize, f32) -> bool) -> StateSequence {
-    let all = recording();
-    let kept: Vec<usize> = (0..all.len()).filter(|&k| kept(k, all.time_s[k])).collect();
-    let pick = |channel: &[f32]| kept.iter().map(|&k| channel[k]).collect();
-    StateSequence {
-        time_s: pick(&all.time_s),
-        v_x_mps: pick(&all.v_x_mps),
-        v_y_mps: pick(&all.v_y_mps),
-        yaw_rate_radps: pick(&all.yaw_rate_radps),
-        steering_rad: pick(&all.steering_rad),
-        ..StateSequence::default()
-    }
+    poor::picked(recording(), kept)
 }
 
 fn answer(sequence: &StateSequence) -> Result<Diagnosis, GapError> {
@@ -80,15 +71,7 @@ fn a_gap_is_stated_and_not_bridged() {
 
 #[test]
 fn a_stop_is_left_out() {
-    let mut stopped = picked(|_, _| true);
-    for k in 0..stopped.len() {
-        if (9.0..15.0).contains(&stopped.time_s[k]) {
-            stopped.v_x_mps[k] = 0.0;
-            stopped.v_y_mps[k] = BIAS_MPS as f32;
-            stopped.yaw_rate_radps[k] = 0.0;
-        }
-    }
-    let d = answer(&stopped).unwrap();
+    let d = answer(&poor::stopped(recording(), BIAS_MPS)).unwrap();
     assert!(d.data_health.moving_share < 0.8, "{}", d.data_health.moving_share);
     let inside = |p: &&gripsight_gap::Prediction| (9.6..14.4).contains(&p.time_s);
     assert_eq!(d.series.predictions.iter().filter(inside).count(), 0);
@@ -97,22 +80,13 @@ fn a_stop_is_left_out() {
 
 #[test]
 fn a_number_that_is_none_is_named_with_its_place() {
-    let mut broken = picked(|_, _| true);
-    broken.v_y_mps[700] = f32::NAN;
-    let error = answer(&broken).unwrap_err().to_string();
+    let error = answer(&poor::with_nan(recording(), 700)).unwrap_err().to_string();
     assert!(error.contains("v_y_mps") && error.contains("700"), "{error}");
 }
 
 #[test]
 fn a_straight_says_what_to_drive() {
-    let all = picked(|_, _| true);
-    let level = StateSequence {
-        v_y_mps: (0..all.len()).map(|k| 0.002 * (k % 5) as f32).collect(),
-        yaw_rate_radps: (0..all.len()).map(|k| 0.001 * (k % 3) as f32).collect(),
-        steering_rad: vec![0.0; all.len()],
-        ..all
-    };
-    let d = answer(&level).unwrap();
+    let d = answer(&poor::straight(recording())).unwrap();
     assert_eq!(d.verdict, Verdict::NotIdentifiable);
     assert!(d.reasons[0].contains("cornering says nothing"), "{}", d.reasons[0]);
     assert!(d.drive_next[0].contains("corners to both sides"), "{}", d.drive_next[0]);
