@@ -50,6 +50,8 @@ pub(crate) fn first_look(
     windows: &Windows,
     extra: &[Vec<f64>],
 ) -> Option<State> {
+    /// Steps more for a look that ends above the model without the effect.
+    const ON_ITS_WAY: usize = 8;
     let effect = screened.effect;
     let spec = effect.spec();
     // Where the derivative at the null says nothing, the start is a guess.
@@ -64,9 +66,9 @@ pub(crate) fn first_look(
             })
             .collect()
     };
+    let from = state.of(effect).map_or_else(|| engine.absent(effect), <[f64]>::to_vec);
     let mut starts: Vec<Vec<f64>> = extra.to_vec();
     if !spec.flat_at_null {
-        let from = state.of(effect).map_or_else(|| engine.absent(effect), <[f64]>::to_vec);
         starts.push(clamp(from.iter().zip(&screened.step).map(|(v, s)| v + s).collect()));
     }
     if extra.is_empty() {
@@ -76,13 +78,21 @@ pub(crate) fn first_look(
     }
     let mut named = state.named.clone();
     named.push(effect);
-    let carried = engine.carry(state, &named);
-    let before = carried.len() - spec.parameters.len();
     starts
         .iter()
         .map(|own| {
-            let values: Vec<f64> = carried[..before].iter().chain(own).copied().collect();
-            engine.look(&named, &values, Some(state.starts.clone()), windows, steps)
+            let change: Vec<f64> = own.iter().zip(&from).map(|(to, from)| to - from).collect();
+            let mut values = engine.carry(&screened.with_rest_along(state, &change), &named);
+            let place = values.len() - own.len();
+            values[place..].copy_from_slice(own);
+            let bounds = engine.parameters(&named, &engine.layout(&named), &values, 1.0);
+            values.iter_mut().zip(&bounds).for_each(|(v, p)| *v = v.clamp(p.low, p.high));
+            let look = engine.look(&named, &values, Some(state.starts.clone()), windows, steps);
+            if look.finite && look.cost > state.cost {
+                // With one parameter more it cannot end above the model without: it is on its way still.
+                return engine.look(&named, &look.parameters, Some(look.starts), windows, ON_ITS_WAY);
+            }
+            look
         })
         .filter(|s| s.finite)
         .min_by(|a, b| a.cost.total_cmp(&b.cost))

@@ -16,8 +16,28 @@ pub(crate) struct Screened {
     pub(crate) gain: f64,
     /// That step.
     pub(crate) step: Vec<f64>,
+    /// How the rest of the model goes along: places of its parameters in the state, and their changes by each of the effect's.
+    along: Vec<(usize, Vec<f64>)>,
     /// Standard error of each parameter, tires and background moving along, at the scatter that the data show.
     pub(crate) error: Vec<f64>,
+}
+
+impl Screened {
+    /// An effect that the Jacobian does not show.
+    pub(crate) fn unseen(effect: EffectId) -> Self {
+        let n = effect.spec().parameters.len();
+        Self { effect, gain: 0.0, step: vec![0.0; n], along: Vec::new(), error: vec![f64::INFINITY; n] }
+    }
+
+    /// The state with tires, background and the effects claimed already where they would go along with a change of the effect. They
+    /// explain some of what it does: where they stay, its own step leads away from the best fit.
+    pub(crate) fn with_rest_along(&self, state: &State, change: &[f64]) -> State {
+        let mut moved = state.clone();
+        for (place, by) in self.along.iter().filter(|(place, _)| *place < state.parameters.len()) {
+            moved.parameters[*place] += by.iter().zip(change).map(|(b, c)| b * c).sum::<f64>();
+        }
+        moved
+    }
 }
 
 /// Result of a screening.
@@ -75,7 +95,7 @@ pub(crate) fn screen(
         let rows: Vec<usize> = place(effect).filter_map(row_of).collect();
         let others: Vec<usize> = screening.own.iter().filter(|r| !rows.contains(r)).copied().collect();
         let (mut block, coupling) = screening.reduced(&rows, &others);
-        let mut g = pick_vector(&here.gradient, &rows) - coupling * pick_vector(&here.gradient, &others);
+        let mut g = pick_vector(&here.gradient, &rows) - &coupling * pick_vector(&here.gradient, &others);
         for (a, &row) in rows.iter().enumerate() {
             let j = free[row];
             if let (Some(tight), Some(loose)) = (parameters[j].prior, free_parameters[j].prior) {
@@ -89,9 +109,14 @@ pub(crate) fn screen(
                 effect,
                 gain: (g.transpose() * &inverse * &g)[(0, 0)],
                 step: (-(&inverse * &g)).iter().copied().collect(),
+                along: others
+                    .iter()
+                    .enumerate()
+                    .map(|(o, &row)| (free[row], (0..n).map(|a| -coupling[(a, o)]).collect()))
+                    .collect(),
                 error: (0..n).map(|a| (inverse[(a, a)].max(0.0) * scatter).sqrt()).collect(),
             },
-            None => Screened { effect, gain: 0.0, step: vec![0.0; n], error: vec![f64::INFINITY; n] },
+            None => Screened::unseen(effect),
         });
         screening.rows.push(rows);
     }

@@ -135,8 +135,7 @@ pub(crate) fn round(
         .filter_map(|(_, s)| first_look(engine, state, s, windows, &[]))
         .collect();
     for &effect in left.iter().filter(|e| e.spec().flat_at_null) {
-        let n = effect.spec().parameters.len();
-        let blank = Screened { effect, gain: 0.0, step: vec![0.0; n], error: vec![f64::INFINITY; n] };
+        let blank = Screened::unseen(effect);
         let extra =
             if effect == EffectId::LowGripPatch { patch_starts(engine, state, windows) } else { Vec::new() };
         looks.extend(first_look(engine, state, &blank, windows, &extra));

@@ -11,8 +11,10 @@ use serde::{Deserialize, Serialize};
 use crate::error::ReferenceCarError;
 
 /// Names of the closed tracks.
-pub const TRACK_NAMES: [&str; 11] =
-    ["oval", "club", "esses", "bean", "clover", "harbor", "valley", "quarry", "delta", "lagoon", "ridge"];
+pub const TRACK_NAMES: [&str; 13] = [
+    "oval", "club", "esses", "bean", "clover", "harbor", "valley", "quarry", "delta", "lagoon", "ridge",
+    "basin", "summit",
+];
 
 /// A closed centre line, sampled evenly by arc length.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,6 +65,8 @@ fn shape(name: &str) -> Option<Shape> {
         "delta" => Shape { size_m: 200.0, cosines: &[(1, 0.12), (5, 0.03)], sines: &[(2, 0.2), (3, 0.12)] },
         "lagoon" => Shape { size_m: 210.0, cosines: &[(1, 0.15), (4, 0.06)], sines: &[(2, 0.14), (3, 0.13)] },
         "ridge" => Shape { size_m: 220.0, cosines: &[(2, 0.24), (5, 0.04)], sines: &[(1, 0.12), (3, -0.11)] },
+        "basin" => Shape { size_m: 195.0, cosines: &[(2, 0.16), (3, -0.13)], sines: &[(1, 0.1), (4, 0.07)] },
+        "summit" => Shape { size_m: 230.0, cosines: &[(1, 0.22), (4, -0.05)], sines: &[(2, 0.1), (3, 0.14)] },
         _ => return None,
     };
     Some(shape)

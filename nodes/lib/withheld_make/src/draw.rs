@@ -34,11 +34,12 @@ impl Pool {
 
     fn tracks(self) -> &'static [&'static str] {
         match self {
-            // The last four were in test batches whose labels are open now.
-            Self::Development => {
-                &["oval", "club", "esses", "bean", "clover", "harbor", "valley", "quarry", "delta"]
-            }
-            Self::Test => &["lagoon", "ridge"],
+            // The last six were in test batches whose labels are open now.
+            Self::Development => &[
+                "oval", "club", "esses", "bean", "clover", "harbor", "valley", "quarry", "delta", "lagoon",
+                "ridge",
+            ],
+            Self::Test => &["basin", "summit"],
         }
     }
 
