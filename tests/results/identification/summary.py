@@ -121,16 +121,16 @@ def draws(out):
 
 
 def priors(out):
-    out.append("\n| prior | used | accepted | with D at the prior | D off by more than 25 % | stiffness off by more than 25 % | refused as contradicting |")
-    out.append("| --- | --- | --- | --- | --- | --- | --- |")
-    for name, off in (("accuracy_prior_0.csv", "the road's mu"), ("accuracy_prior_0.4.csv", "0.4 above it")):
-        used = [r for r in rows(name) if not refused(r)]
+    out.append("\n| prior | sigma | used | accepted | with D at the prior | D off by more than 25 % | stiffness off by more than 25 % | refused as contradicting |")
+    out.append("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    for off, text, sigma in (("0", "the road's mu", "0.1"), ("0", "the road's mu", "0.2"), ("0.4", "0.4 above it", "0.1"), ("0.4", "0.4 above it", "0.2")):
+        used = [r for r in rows(f"accuracy_prior_{off}_{sigma}.csv") if not refused(r)]
         accepted = [r for r in used if int(r["accepted"])]
         held = sum("the prior's" in r["reasons"] for r in accepted)
         against = sum("contradicts" in r["reasons"] for r in used)
         worst = lambda r, of, truth: max(abs(number(r, of + a) / number(r, f"{of}{a}_{truth}") - 1) for a in "fr")
         out.append(
-            f"| {off} | {len(used)} | {len(accepted)} | {held} | "
+            f"| {text} | {sigma} | {len(used)} | {len(accepted)} | {held} | "
             f"{sum(worst(r, 'd', 'floor') > 0.25 for r in accepted)} | {sum(worst(r, 'k', 'true') > 0.25 for r in accepted)} | "
             f"{against} |"
         )
@@ -167,20 +167,26 @@ def residuals(out):
 
 
 def paper(out):
-    every = rows("paper.csv")
-    for data, title in (("first", "Triggered in the first acceleration: the first 9 s"), ("whole", "The whole drive, 30 s")):
-        out.append(f"\n## {title}\n")
-        out.append("| network | prior | RMSE front, median (range) | rear | turns | settled | s, median |")
-        out.append("| --- | --- | --- | --- | --- | --- | --- |")
-        for prior in ("none", "0.8"):
-            for network in ("mlp", "rnn", "s4"):
-                group = [r for r in every if (r["data"], r["prior"], r["network"]) == (data, prior, network)]
-                turns = ", ".join(r["turns"] for r in group)
-                settled = sum(r["converged"] == "true" for r in group)
-                figures = [spread([number(r, k) for r in group]) for k in ("rmse_front", "rmse_rear")]
-                seconds = statistics.median(number(r, "seconds") for r in group)
-                out.append(f"| {network} | {prior} | {figures[0]} | {figures[1]} | {turns} | {settled} of {len(group)} | {seconds:.1f} |")
-    out.append("\n![RMSE of every network and drive](paper.svg)")
+    reference, foreign = rows("paper.csv"), rows("paper_foreign.csv")
+    slipx = [r for r in foreign if r["run"].startswith("slipx")]
+    commonroad = [r for r in foreign if not r["run"].startswith("slipx")]
+    for every, plant in ((reference, "Reference car"), (slipx, "slipx"), (commonroad, "CommonRoad")):
+        for data, title in (("first", "triggered in the first acceleration: the first 9 s"), ("whole", "the whole drive")):
+            out.append(f"\n## {plant}, {title}\n")
+            out.append("| network | prior | RMSE front, median (range) | rear | turns | settled | s, median |")
+            out.append("| --- | --- | --- | --- | --- | --- | --- |")
+            for prior in ("none", "road"):
+                for network in ("mlp", "rnn", "s4"):
+                    group = [r for r in every if (r["data"], r["prior"], r["network"]) == (data, prior, network)]
+                    turns = ", ".join(r["turns"] for r in group)
+                    settled = sum(r["converged"] == "true" for r in group)
+                    figures = [spread([number(r, k) for r in group]) for k in ("rmse_front", "rmse_rear")]
+                    seconds = statistics.median(number(r, "seconds") for r in group)
+                    out.append(f"| {network} | {prior} | {figures[0]} | {figures[1]} | {turns} | {settled} of {len(group)} | {seconds:.1f} |")
+        floors = [spread([number(r, k) for r in every]) for k in ("floor_front", "floor_rear")]
+        out.append(f"\nFloor: {floors[0]} front, {floors[1]} rear.")
+    out.append("\n![RMSE of every network and drive on the reference car](paper.svg)")
+    out.append("\n![The same on the foreign plants](paper_foreign.svg)")
 
 
 def robustness(out):

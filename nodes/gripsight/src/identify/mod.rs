@@ -51,7 +51,7 @@ pub(crate) struct IdentifyArgs {
     #[arg(long, value_name = "MU", conflicts_with = "camera", value_parser = positive)]
     prior_mu: Option<f64>,
     /// Standard deviation of that belief.
-    #[arg(long, value_name = "SIGMA", default_value_t = 0.2, requires = "prior_mu", value_parser = positive)]
+    #[arg(long, value_name = "SIGMA", default_value_t = 0.1, requires = "prior_mu", value_parser = positive)]
     prior_sigma: f64,
     /// Take that belief from the bag's camera pictures.
     #[arg(long)]

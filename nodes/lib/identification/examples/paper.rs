@@ -1,26 +1,26 @@
-//! The paper's Tables II and III on the reference car: `--method paper` from mu0 = 0.51, with and without the vision prior, three networks.
+//! The paper's Tables II and III: `--method paper` from mu0 = 0.51, with and without the vision prior, three networks.
 //!
 //! ```text
-//! cargo run --release -p gripsight_identification --example paper -- PICTURE.svg [SEED...] > tests/results/identification/paper.csv
+//! cargo run --release -p gripsight_identification --example paper -- PICTURE.svg SEED... > tests/results/identification/paper.csv
+//! cargo run --release -p gripsight_identification --example paper -- PICTURE.svg FOLDER... > tests/results/identification/paper_foreign.csv
 //! ```
 //!
-//! Load transfer, relaxation and combined slip are on; the road's mu is 0.8, and so is the prior, as in the paper: its texture matches its friction.
-//! Each drive is used whole, and cut where the paper's experiment triggers: within the first acceleration, to the shortest drive that is identified from.
-//! Smoothing, end and directions of the sweep, and when the loop ends, were chosen on seeds 21 to 24; the test drives had not been looked at. Others can be named.
+//! Seeds are drives of the reference car: load transfer, relaxation and combined slip on, the road's mu 0.8. Folders are drives of
+//! `tests/plants/make_foreign_bags.py`. The prior is the road's own mu, as in the paper: its texture matches its friction. Each drive is used whole, and cut where the paper's experiment triggers: within the first acceleration, to the shortest drive that is identified from.
+//! Smoothing, end and directions of the sweep, and when the loop ends, were chosen on seeds 21 to 24.
 #[allow(dead_code)]
 mod support;
 
+use std::path::Path;
 use std::time::Instant;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use gripsight_identification::{Config, FrictionPrior, Method, PerAxle, ResidualKind, identify};
 use gripsight_signals::StateSequence;
 use support::picture::{Line, add, draw};
-use support::{floor, picture_and_seeds, reference_run, score};
+use support::{Run, floor, read_with_truth, reference_run, score};
 
-/// Test drives; odd ones go round the other way.
-const SEEDS: [u64; 4] = [88, 89, 90, 91];
-/// Road and prior.
+/// Road of the reference car.
 const MU: f64 = 0.8;
 /// The paper's loop took 7 turns.
 const TURNS: u32 = 8;
@@ -45,20 +45,33 @@ fn first(whole: &StateSequence) -> StateSequence {
     }
 }
 
+/// A drive, and the friction of its road.
+fn drive(named: &str) -> Result<(Run, f64)> {
+    if let Ok(seed) = named.parse() {
+        return Ok((reference_run("f1tenth", "club", MU, 0.9, seed, true), MU));
+    }
+    let folder = Path::new(named);
+    let about: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.join("about.json"))?)?;
+    let mu = about["mu"].as_f64().context("about.json without mu")?;
+    Ok((read_with_truth(folder, f64::INFINITY)?, mu))
+}
+
 fn main() -> Result<()> {
-    let (picture, seeds) = picture_and_seeds(&SEEDS)?;
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let (picture, drives) = arguments.split_first().context("where to draw the picture?")?;
     println!(
-        "seed,data,network,prior,rmse_front,rmse_rear,floor_front,floor_rear,turns,converged,seconds,slip_front,slip_rear"
+        "run,data,network,prior,rmse_front,rmse_rear,floor_front,floor_rear,turns,converged,seconds,slip_front,slip_rear"
     );
     let mut lines: Vec<Line> = Vec::new();
     let mut floors = [0.0; 2];
-    for seed in &seeds {
-        let run = reference_run("f1tenth", "club", MU, 0.9, *seed, true);
+    for named in drives {
+        let (run, mu) = drive(named)?;
         let floor = [floor(&run.truth.front)?.1, floor(&run.truth.rear)?.1];
-        (0..2).for_each(|axle| floors[axle] += floor[axle] / seeds.len() as f64);
+        (0..2).for_each(|axle| floors[axle] += floor[axle] / drives.len() as f64);
         let begin = first(&run.sequence);
         for (data, sequence) in [("whole", &run.sequence), ("first", &begin)] {
-            for prior in [None, Some(FrictionPrior { mu: MU, sigma: 0.1 })] {
+            for prior in [None, Some(FrictionPrior { mu, sigma: 0.1 })] {
                 for residual in NETWORKS {
                     let config = Config {
                         method: Method::Paper,
@@ -71,10 +84,10 @@ fn main() -> Result<()> {
                     let seconds = begin.elapsed().as_secs_f64();
                     let rmse = score(&outcome.phi_p, &run.truth);
                     let PerAxle { front, rear } = outcome.slip_range_rad.map(|slip| slip.high.max(-slip.low));
-                    let (network, prior) = (residual.name(), prior.map_or("none", |_| "0.8"));
+                    let (network, prior) = (residual.name(), if prior.is_some() { "road" } else { "none" });
                     println!(
-                        "{seed},{data},{network},{prior},{:.4},{:.4},{:.4},{:.4},{},{},{seconds:.2},{front:.3},{rear:.3}",
-                        rmse[0], rmse[1], floor[0], floor[1], outcome.iterations, outcome.converged
+                        "{},{data},{network},{prior},{:.4},{:.4},{:.4},{:.4},{},{},{seconds:.2},{front:.3},{rear:.3}",
+                        run.name, rmse[0], rmse[1], floor[0], floor[1], outcome.iterations, outcome.converged
                     );
                     let with = if prior == "none" { "" } else { ", prior" };
                     let name = format!("{network}, {data} drive{with}");
@@ -83,5 +96,5 @@ fn main() -> Result<()> {
             }
         }
     }
-    draw("The paper's procedure", &lines, floors, &picture)
+    draw("The paper's procedure", &lines, floors, Path::new(picture))
 }

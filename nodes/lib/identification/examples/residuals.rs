@@ -2,23 +2,21 @@
 //! without the vision prior.
 //!
 //! ```text
-//! cargo run --release -p gripsight_identification --example residuals -- PICTURE.svg [SEED...] > tests/results/identification/residuals.csv
+//! cargo run --release -p gripsight_identification --example residuals -- PICTURE.svg SEED... > tests/results/identification/residuals.csv
 //! ```
 //!
-//! The 1:10 car on the club track, mu 0.8, load transfer, relaxation and combined slip on; the prior is the road's mu. The test drives had not been looked
-//! at before they were published; others can be named.
+//! The 1:10 car on the club track, mu 0.8, load transfer, relaxation and combined slip on; the prior is the road's mu.
 #[allow(dead_code)]
 mod support;
 
+use std::path::Path;
 use std::time::Instant;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use gripsight_identification::{Config, FrictionPrior, ResidualKind, identify};
 use support::picture::{Line, add, draw};
-use support::{floor, picture_and_seeds, reference_run, score};
+use support::{floor, reference_run, score};
 
-/// Test drives; odd ones go round the other way.
-const SEEDS: [u64; 6] = [90, 91, 92, 93, 94, 95];
 /// Road and prior.
 const MU: f64 = 0.8;
 /// Network, and whether least squares comes first.
@@ -41,7 +39,9 @@ fn name(residual: ResidualKind, direct_start: bool) -> String {
 }
 
 fn main() -> Result<()> {
-    let (picture, seeds) = picture_and_seeds(&SEEDS)?;
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let (picture, seeds) = arguments.split_first().context("where to draw the picture?")?;
+    let seeds = seeds.iter().map(|seed| seed.parse()).collect::<Result<Vec<u64>, _>>()?;
     println!(
         "seed,method,prior,rmse_front,rmse_rear,floor_front,floor_rear,rollout_v_y_mps,rollout_yaw_rate_radps,turns,converged,source,accepted,seconds"
     );
@@ -77,5 +77,5 @@ fn main() -> Result<()> {
             }
         }
     }
-    draw("Least squares and residual networks", &lines, floors, &picture)
+    draw("Least squares and residual networks", &lines, floors, Path::new(picture))
 }

@@ -2,7 +2,7 @@
 
 pub(crate) mod picture;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::{Context, Result};
 use gripsight_bag::{TopicMap, read_sequences};
@@ -11,14 +11,6 @@ use gripsight_identification::{PerAxle, tires::BOUNDS};
 use gripsight_reference_car::Recording;
 use gripsight_signals::{StateSequence, WindowConfig};
 use gripsight_vehicle::{MagicFormula, PacejkaParameters, VehicleParameters};
-
-/// The command line `PICTURE.svg [SEED...]`: where to draw, and the drives, `seeds` where none is named.
-pub(crate) fn picture_and_seeds(seeds: &[u64]) -> Result<(PathBuf, Vec<u64>)> {
-    let mut arguments = std::env::args().skip(1);
-    let picture = arguments.next().context("where to draw the picture?")?;
-    let named = arguments.map(|seed| seed.parse()).collect::<Result<Vec<u64>, _>>()?;
-    Ok((picture.into(), if named.is_empty() { seeds.to_vec() } else { named }))
-}
 
 /// True slips and normalised forces of an axle.
 #[derive(Debug, Clone, Default)]
