@@ -39,6 +39,8 @@ pub(crate) struct Facts {
     pub(crate) prior: String,
     /// Sequence of the set that the MPC has.
     pub(crate) in_force: Option<u64>,
+    /// What the newest sequence says against that set, in words.
+    pub(crate) grip: Option<String>,
 }
 
 /// ERROR: the last run gave no set at all. WARN: its set was rejected (the MPC keeps the one before).
@@ -60,6 +62,7 @@ pub(crate) fn status(facts: &Facts) -> Status {
         .value("accepted", facts.accepted)
         .value("last run [s]", format!("{:.2}", facts.last_run_s))
         .value("friction prior", &facts.prior)
+        .value("grip", facts.grip.as_deref().unwrap_or("as it was"))
         .value("sequence of the set in force", facts.in_force.map_or("none".to_owned(), |id| id.to_string()))
 }
 
@@ -78,6 +81,7 @@ mod tests {
                 last_run_s: 1.0,
                 prior: "none".into(),
                 in_force: None,
+                grip: None,
             })
         };
         assert_eq!((of(LastRun::None).level, of(LastRun::None).message.as_str()), (Level::Ok, "training"));

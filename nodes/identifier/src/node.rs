@@ -7,7 +7,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use gripsight_bag::Reassembler;
 use gripsight_identification::export::{Provenance, TireFiles};
-use gripsight_identification::{AcceptedSet, Config, FrictionPrior, Method, Outcome};
+use gripsight_identification::{AcceptedSet, Config, FrictionPrior, Method, Monitor, Outcome};
 use gripsight_identification_messages as messages;
 use gripsight_msgs::{
     FrictionPrior as FrictionMessage, ResidualModel as ModelMessage, StateSequence as SequenceMessage,
@@ -40,6 +40,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
             last_run_s: 0.0,
             prior: "none".to_owned(),
             in_force: None,
+            grip: None,
         });
         let (newest, sequence) = watch::channel(None);
         let (prior, prior_in_force) = watch::channel(None);
@@ -174,6 +175,13 @@ async fn identify_each(
     while sequences.changed().await.is_ok() {
         let Some(sequence) = sequences.borrow_and_update().clone() else { continue };
         let start = Instant::now();
+        if let Some(set) = accepted.clone() {
+            let notice = notice(Arc::clone(&sequence), Arc::clone(vehicle), set).await;
+            if let Some(notice) = &notice {
+                tracing::warn!("sequence {}: {notice}", sequence.sequence_id);
+            }
+            facts.borrow_mut().grip = notice;
+        }
         let run = Run {
             sequence: Arc::clone(&sequence),
             vehicle: Arc::clone(vehicle),
@@ -203,6 +211,16 @@ async fn identify_each(
             tracing::error!("sequence {}: {error}", sequence.sequence_id);
         }
     }
+}
+
+/// What the last seconds of a sequence say of the set in use; telemetry that cannot be looked at says nothing.
+async fn notice(
+    sequence: Arc<StateSequence>,
+    vehicle: Arc<VehicleParameters>,
+    set: AcceptedSet,
+) -> Option<String> {
+    let look = move || Monitor::new(&vehicle, &set).ok()?.look(&sequence).ok()?.notice(&set);
+    tokio::task::spawn_blocking(look).await.ok()?
 }
 
 fn last_run(result: &Result<Outcome, RunError>) -> LastRun {

@@ -4,6 +4,7 @@ mod previous;
 mod progress;
 mod summary;
 mod truth;
+mod windows;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -26,6 +27,7 @@ use crate::camera::{NetworkArgs, prior_of_bag};
 use crate::diagnose::extended_model;
 use crate::invocation::invocation;
 use progress::{Progress, Timing};
+use windows::Windows;
 
 /// Identify the tires of the car in a bag.
 ///
@@ -34,12 +36,14 @@ use progress::{Progress, Timing};
 /// are named *.rejected.* instead, what lies there already stays as it is, and the exit code is 3.
 ///
 /// A bag of odometry and drive commands is taken as one stretch. A bag of recorded state sequences is worked through in
-/// their order, as the nodes do live, each starting from the set accepted last; the files describe the last one.
+/// their order, as the nodes do live, each starting from the set accepted last; the files describe the last one. So is a bag
+/// of odometry with --window; windows.csv then holds every window, and when a change of the grip was noticed.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   gripsight identify laps.mcap --vehicle car.yaml --out result
   gripsight identify laps.mcap --vehicle car.yaml --prior-mu 1.0 --out result
+  gripsight identify laps.mcap --vehicle car.yaml --window 20 --hop 5 --out result
   gripsight identify laps.mcap --vehicle car.yaml --camera --method paper --seed 3 --out result")]
 pub(crate) struct IdentifyArgs {
     /// An .mcap file or a rosbag2 folder.
@@ -77,6 +81,12 @@ pub(crate) struct IdentifyArgs {
     /// extended_model.yaml of a diagnosis: its effects are taken out of the signals before the tires are identified.
     #[arg(long, value_name = "FILE")]
     extended_model: Option<PathBuf>,
+    /// Identify again and again from a moving window of this length [s].
+    #[arg(long, value_name = "S", value_parser = positive)]
+    window: Option<f64>,
+    /// How far the window moves [s].
+    #[arg(long, value_name = "S", default_value_t = 10.0, requires = "window", value_parser = positive)]
+    hop: f64,
     /// Only the recorded state sequence with this id.
     #[arg(long, value_name = "ID")]
     sequence: Option<u64>,
@@ -152,9 +162,12 @@ impl IdentifyArgs {
 
     /// What to identify from, in order.
     fn sequences(&self, topics: &TopicMap) -> anyhow::Result<(Vec<StateSequence>, ReadReport)> {
-        // One window over all there is: identification gets better with every corner.
-        let whole = WindowConfig { length_s: f64::INFINITY, hop_s: f64::INFINITY };
-        let (mut sequences, report) = read_sequences(&self.bag, topics, whole)?;
+        // One window over all there is where none is asked for: identification gets better with every corner.
+        let window = match self.window {
+            Some(length_s) => WindowConfig { length_s, hop_s: self.hop },
+            None => WindowConfig { length_s: f64::INFINITY, hop_s: f64::INFINITY },
+        };
+        let (mut sequences, report) = read_sequences(&self.bag, topics, window)?;
         if let Some(id) = self.sequence {
             let ids: Vec<String> = sequences.iter().map(|s| s.sequence_id.to_string()).collect();
             sequences.retain(|s| s.sequence_id == id);
@@ -188,7 +201,9 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
     let config = args.config();
     let progress = Progress::new();
     let mut last = None;
+    let mut windows = Windows::default();
     for sequence in &sequences {
+        windows.look(sequence, &vehicle, previous.as_ref())?;
         let mut stages = progress.run(&config);
         let result =
             identify(sequence, &vehicle, prior, previous.as_ref(), &config, &mut |stage| stages.enter(stage))
@@ -197,14 +212,19 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
         let writing = Instant::now();
         let files = write(args, &vehicle, &notes, sequence, &result)?;
         timing.writing_s += writing.elapsed().as_secs_f64();
+        windows.add(sequence, &result);
         previous = result.accepted_set().or(previous);
         last = Some((result, files));
     }
     timing.total_s = start.elapsed().as_secs_f64();
-    let Some((result, files)) = last else { bail!("{}: no state sequence", args.bag.display()) };
+    let Some((result, mut files)) = last else { bail!("{}: no state sequence", args.bag.display()) };
+    if sequences.len() > 1 {
+        files.push(windows.write(&args.out)?);
+    }
     let timing_file = args.out.join("timing.json");
     fs::write(&timing_file, serde_json::to_string_pretty(&timing)? + "\n")
         .with_context(|| format!("cannot write {}", timing_file.display()))?;
+    print!("{}", windows.notices());
     print!("{}", summary::summary(&car_name(args, &vehicle), &result, &files, &timing));
     Ok(if result.accepted { Outcome::Done } else { Outcome::NotAccepted })
 }

@@ -1,6 +1,6 @@
 //! Watches the set in use: does it still fit what the car does, and if not, what became of the grip?
 //!
-//! On each short window of telemetry the peak factors D of both axles are fitted anew, everything else held at the accepted set. A change that is
+//! On the last seconds of each window of telemetry the peak factors D of both axles are fitted anew, everything else held at the accepted set. A change that is
 //! both larger than its uncertainty and worth acting on is a notice; small corners tell nothing and give none.
 
 use gripsight_signals::{DataHealth, StateSequence};
@@ -9,7 +9,7 @@ use gripsight_vehicle::VehicleParameters;
 use crate::data::Data;
 use crate::judge::rollout_errors;
 use crate::rollout::{TireRollout, vector_of};
-use crate::shooting::{Parameter, Problem, fit};
+use crate::shooting::{Parameter, Problem, Window, fit};
 use crate::tires::D_BOUNDS;
 use crate::{AcceptedSet, Estimate, IdentificationError, PerAxle, vehicle_hash};
 
@@ -17,6 +17,8 @@ use crate::{AcceptedSet, Estimate, IdentificationError, PerAxle, vehicle_hash};
 const NOTICEABLE: f64 = 0.08;
 /// A change has to be this many standard errors large.
 const SIGNIFICANT: f64 = 3.0;
+/// What is looked at: long enough for some corners, short enough for a notice while the change is fresh.
+const LOOK_S: f64 = 10.0;
 /// Fewest windows of the telemetry to look at.
 const WINDOWS: usize = 4;
 /// Robustness of the window loss, in noises.
@@ -33,6 +35,20 @@ pub struct Reading {
     pub peak_factor: PerAxle<Estimate>,
     /// Whether the grip has changed: identify anew.
     pub changed: bool,
+}
+
+impl Reading {
+    /// The change in words, if there was one, against the set that was watched.
+    #[must_use]
+    pub fn notice(&self, set: &AcceptedSet) -> Option<String> {
+        let (now, then) = (&self.peak_factor, &set.phi_p);
+        self.changed.then(|| {
+            format!(
+                "the grip has changed: D {:.2} -> {:.2} front, {:.2} -> {:.2} rear",
+                then.front.d, now.front.value, then.rear.d, now.rear.value
+            )
+        })
+    }
 }
 
 /// Watches one accepted set.
@@ -55,14 +71,28 @@ impl Monitor {
         Ok(Self { vehicle: vehicle.clone(), set: set.clone() })
     }
 
-    /// Looks at some seconds of telemetry.
+    /// Looks at the last 10 s of telemetry.
     ///
     /// # Errors
     /// [`IdentificationError`] for telemetry that is malformed, frozen or holds less than 2.4 s of driving.
     pub fn look(&self, sequence: &StateSequence) -> Result<Reading, IdentificationError> {
         let data = Data::new(sequence, &self.vehicle, &DataHealth::of(sequence)?, WINDOWS)?;
         let model = TireRollout::new(&self.vehicle, &data);
-        let windows: Vec<_> = data.windows.iter().map(|(w, _)| *w).collect();
+        let from_s = sequence.duration_s() - LOOK_S;
+        let late = |w: &Window| {
+            let segment = &data.segments[w.segment];
+            segment.start_time_s + w.from as f64 * segment.dt_s >= from_s
+        };
+        let windows: Vec<Window> = data.windows.iter().map(|(w, _)| *w).filter(late).collect();
+        if windows.len() < WINDOWS {
+            let length_s = windows.first().map_or(0.0, |w| w.len as f64 * data.dt_s);
+            return Err(IdentificationError::TooLittle {
+                what: "driving time in s at the end of the telemetry",
+                got: windows.len() as f64 * length_s,
+                needed: WINDOWS as f64 * length_s,
+                drive: "drive on",
+            });
+        }
         let p = vector_of(&self.set.phi_p, &self.set.corrections, &self.set.nuisance);
         let sigma = self.set.rollout_rmse.map(|s| s.max(1e-6));
         let parameters: Vec<Parameter> = p

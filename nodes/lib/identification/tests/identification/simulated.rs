@@ -207,7 +207,8 @@ fn the_monitor_notices_a_loss_of_grip_and_nothing_else() {
     assert!(!quiet.changed, "{quiet:?}");
     let (_, slippery, _) = drive(at(0.5, 25).duration(15.0));
     let notice = monitor.look(&slippery).unwrap();
-    assert!(notice.changed, "{notice:?}");
+    assert!(notice.changed && quiet.notice(&set).is_none(), "{notice:?}");
+    assert!(notice.notice(&set).unwrap().starts_with("the grip has changed: D 0."));
     assert!(notice.peak_factor.front.value < 0.9 * set.phi_p.front.d, "{notice:?}");
     // Warm-started, the next run follows.
     let (_, longer, _) = drive(at(0.5, 27));

@@ -1,0 +1,90 @@
+//! One line a window: what was found, and when a change of the grip was noticed.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use gripsight_identification::{AcceptedSet, Monitor, Outcome, Reading};
+use gripsight_signals::{NS_PER_S, StateSequence};
+use gripsight_vehicle::VehicleParameters;
+
+/// The windows of a run, in their order.
+#[derive(Debug, Default)]
+pub(super) struct Windows {
+    /// Stamp of the first sample of all.
+    start_ns: Option<i64>,
+    /// What the set in use looked like on the window that comes next.
+    reading: Option<Reading>,
+    lines: String,
+    notices: String,
+}
+
+impl Windows {
+    /// Looks whether the set in use still fits; what cannot be looked at tells nothing.
+    pub(super) fn look(
+        &mut self,
+        sequence: &StateSequence,
+        vehicle: &VehicleParameters,
+        set: Option<&AcceptedSet>,
+    ) -> anyhow::Result<()> {
+        let start_ns = *self.start_ns.get_or_insert(sequence.start_stamp_ns);
+        let Some(set) = set else { return Ok(()) };
+        self.reading = Monitor::new(vehicle, set)?
+            .look(sequence)
+            .inspect_err(|error| tracing::debug!("the set in use was not looked at: {error}"))
+            .ok();
+        if let Some(reading) = &self.reading
+            && let Some(notice) = reading.notice(set)
+        {
+            let notice = format!("{:.1} s: {notice}", seconds(reading.stamp_ns - start_ns));
+            tracing::warn!("{notice}");
+            let _ = writeln!(self.notices, "{notice}");
+        }
+        Ok(())
+    }
+
+    /// Takes down what a window gave.
+    pub(super) fn add(&mut self, sequence: &StateSequence, result: &Outcome) {
+        let from_s = seconds(sequence.start_stamp_ns - self.start_ns.unwrap_or(sequence.start_stamp_ns));
+        let (k, d) = (&result.cornering_stiffness_n_per_rad, &result.peak_friction);
+        let _ = write!(
+            self.lines,
+            "{from_s:.3},{:.3},{},{:.1},{:.1},{:.4},{:.4},{},{},",
+            from_s + sequence.duration_s(),
+            result.accepted,
+            k.front.value,
+            k.rear.value,
+            d.front.value,
+            d.rear.value,
+            d.front.reached,
+            d.rear.reached
+        );
+        let _ = match self.reading.take() {
+            Some(Reading { error_ratio, peak_factor, changed, .. }) => writeln!(
+                self.lines,
+                "{error_ratio:.3},{:.4},{:.4},{changed}",
+                peak_factor.front.value, peak_factor.rear.value
+            ),
+            None => writeln!(self.lines, ",,,"),
+        };
+    }
+
+    /// When the grip was seen to have changed: a line each.
+    pub(super) fn notices(&self) -> &str {
+        &self.notices
+    }
+
+    /// Writes `windows.csv`.
+    pub(super) fn write(&self, folder: &Path) -> anyhow::Result<PathBuf> {
+        const HEADER: &str = "from_s,to_s,accepted,k_front_n_per_rad,k_rear_n_per_rad,d_front,d_rear,reached_front,reached_rear,\
+            error_ratio,d_front_now,d_rear_now,changed\n";
+        let path = folder.join("windows.csv");
+        std::fs::write(&path, HEADER.to_owned() + &self.lines)
+            .with_context(|| format!("cannot write {}", path.display()))?;
+        Ok(path)
+    }
+}
+
+fn seconds(ns: i64) -> f64 {
+    ns as f64 / NS_PER_S
+}
