@@ -22,6 +22,8 @@ const LEAST_LISTED: f64 = 0.01;
 const EXPLAINABLE: f64 = 0.2;
 const LARGE_ERROR: f64 = 4.0;
 const HUGE_COST: f64 = 4.0;
+/// Confidence from which a drive to make sure of a candidate is worth it.
+const WORTH_A_DRIVE: f64 = 0.05;
 /// Candidates at most that a drive to make sure is proposed for, where nothing is named.
 const MOST_TO_MAKE_SURE: usize = 2;
 /// Excess of the nominal over the retuned model that makes it a retune.
@@ -266,7 +268,7 @@ pub(crate) fn drive_next(effects: &[RankedEffect]) -> Vec<String> {
         ));
     }
     if !effects.iter().any(|e| e.accepted) {
-        let candidates = effects.iter().filter(|e| e.confidence > 0.0).take(MOST_TO_MAKE_SURE);
+        let candidates = effects.iter().filter(|e| e.confidence > WORTH_A_DRIVE).take(MOST_TO_MAKE_SURE);
         for id in candidates.filter_map(|e| EffectId::by_name(e.name)) {
             out.push(format!("to make sure of {}: {}", id.name(), id.spec().excitation));
         }
