@@ -81,10 +81,10 @@ pub(crate) struct IdentifyArgs {
     /// extended_model.yaml of a diagnosis: its effects are taken out of the signals before the tires are identified.
     #[arg(long, value_name = "FILE")]
     extended_model: Option<PathBuf>,
-    /// Identify again and again from a moving window of this length [s].
+    /// Identify again and again from a moving window of this length.
     #[arg(long, value_name = "S", value_parser = positive)]
     window: Option<f64>,
-    /// How far the window moves [s].
+    /// How far the window moves.
     #[arg(long, value_name = "S", default_value_t = 10.0, requires = "window", value_parser = positive)]
     hop: f64,
     /// Only the recorded state sequence with this id.
