@@ -111,7 +111,7 @@ fn constants_agree() {
     check! {
         FrictionPrior { CONFIGURED CAMERA }
         PacejkaParams { PROPOSED ACCEPTED REJECTED }
-        IdentificationProgress { WAITING PREPARING TRAINING FITTING FINISHED GIVEN_UP }
+        IdentificationProgress { WAITING PREPARING TRAINING SWEEPING FITTING FINISHED GIVEN_UP }
         diagnostic_msgs::DiagnosticStatus { OK WARN ERROR STALE }
         rcl_interfaces::Log { DEBUG INFO WARN ERROR FATAL }
     }

@@ -37,7 +37,9 @@ impl IdentificationProgress {
     pub const PREPARING: u8 = 1;
     /// Candidate sent, waiting for its residual model.
     pub const TRAINING: u8 = 2;
-    /// Virtual steady-state test and Nelder-Mead.
+    /// Virtual steady-state test.
+    pub const SWEEPING: u8 = 6;
+    /// Nelder-Mead on what it showed.
     pub const FITTING: u8 = 3;
     /// The set is accepted or rejected.
     pub const FINISHED: u8 = 4;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use gripsight_bag::Reassembler;
 use gripsight_identification::export::{Provenance, TireFiles};
-use gripsight_identification::{AcceptedSet, Config, FrictionPrior, Method, Monitor, Outcome};
+use gripsight_identification::{AcceptedSet, Config, FrictionPrior, Method, Outcome};
 use gripsight_identification_messages as messages;
 use gripsight_msgs::{
     FrictionPrior as FrictionMessage, ResidualModel as ModelMessage, StateSequence as SequenceMessage,
@@ -171,17 +171,11 @@ async fn identify_each(
     settings: &Settings,
     facts: &RefCell<Facts>,
 ) {
+    outputs.waiting().await;
     let mut accepted: Option<AcceptedSet> = None;
     while sequences.changed().await.is_ok() {
         let Some(sequence) = sequences.borrow_and_update().clone() else { continue };
         let start = Instant::now();
-        if let Some(set) = accepted.clone() {
-            let notice = notice(Arc::clone(&sequence), Arc::clone(vehicle), set).await;
-            if let Some(notice) = &notice {
-                tracing::warn!("sequence {}: {notice}", sequence.sequence_id);
-            }
-            facts.borrow_mut().grip = notice;
-        }
         let run = Run {
             sequence: Arc::clone(&sequence),
             vehicle: Arc::clone(vehicle),
@@ -189,6 +183,7 @@ async fn identify_each(
             previous: accepted.clone(),
             config: settings.config(),
             model_timeout: Duration::from_secs_f64(settings.model_timeout_s.get()),
+            start,
             outputs,
             models: &mut models,
             on_step: &|text| facts.borrow_mut().running = Some(text.to_owned()),
@@ -197,6 +192,12 @@ async fn identify_each(
         if let Ok(outcome) = &result {
             outputs.conclude(outcome, &sequence).await;
             log(outcome);
+            let notice =
+                outcome.grip.as_ref().zip(accepted.as_ref()).and_then(|(grip, set)| grip.notice(set));
+            if let Some(notice) = &notice {
+                tracing::warn!("sequence {}: {notice}", sequence.sequence_id);
+            }
+            facts.borrow_mut().grip = notice;
             accepted = outcome.accepted_set().or(accepted);
             write_files(outcome, &sequence, settings);
         }
@@ -211,16 +212,6 @@ async fn identify_each(
             tracing::error!("sequence {}: {error}", sequence.sequence_id);
         }
     }
-}
-
-/// What the last seconds of a sequence say of the set in use; telemetry that cannot be looked at says nothing.
-async fn notice(
-    sequence: Arc<StateSequence>,
-    vehicle: Arc<VehicleParameters>,
-    set: AcceptedSet,
-) -> Option<String> {
-    let look = move || Monitor::new(&vehicle, &set).ok()?.look(&sequence).ok()?.notice(&set);
-    tokio::task::spawn_blocking(look).await.ok()?
 }
 
 fn last_run(result: &Result<Outcome, RunError>) -> LastRun {

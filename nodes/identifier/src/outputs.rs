@@ -47,6 +47,20 @@ impl Outputs {
         }
     }
 
+    /// Says that there has been no sequence yet.
+    pub(crate) async fn waiting(&self) {
+        let message = Progress {
+            stage: Progress::WAITING,
+            change: f64::NAN,
+            tolerance: f64::NAN,
+            cost: f64::NAN,
+            extrapolated_share: f64::NAN,
+            text: "waiting for the first sequence".to_owned(),
+            ..Progress::default()
+        };
+        self.progress.publish(&message).await;
+    }
+
     /// Says where a run stands.
     pub(crate) async fn progress(&self, step: &Step<'_>) {
         let last = step.last;

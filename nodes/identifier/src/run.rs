@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use gripsight_identification::{
-    AcceptedSet, Candidate, Config, FrictionPrior, Identification, IdentificationError, Next, Outcome,
-    ResidualModel, RunKey, Started,
+    AcceptedSet, Candidate, Config, FrictionPrior, Identification, IdentificationError, IterationRecord,
+    Next, Outcome, ResidualModel, RunKey, Started,
 };
 use gripsight_identification_messages as messages;
 use gripsight_msgs::{IdentificationProgress as Progress, ResidualModel as ModelMessage};
@@ -41,6 +41,8 @@ pub(crate) struct Run<'a> {
     pub(crate) previous: Option<AcceptedSet>,
     pub(crate) config: Config,
     pub(crate) model_timeout: Duration,
+    /// When it began.
+    pub(crate) start: Instant,
     pub(crate) outputs: &'a Outputs,
     pub(crate) models: &'a mut Subscription<ModelMessage>,
     /// Told where the run stands, for the diagnostics.
@@ -50,42 +52,57 @@ pub(crate) struct Run<'a> {
 impl Run<'_> {
     /// Asks, fits and repeats until an outcome stands.
     pub(crate) async fn finish(mut self) -> Result<Outcome, RunError> {
-        let start = Instant::now();
+        let key = RunKey::first(&self.sequence, &self.vehicle, &self.config);
+        self.step(&key, Progress::PREPARING, None, "correcting the signals, fitting directly".to_owned())
+            .await;
         let (sequence, vehicle) = (Arc::clone(&self.sequence), Arc::clone(&self.vehicle));
         let (prior, previous, config) = (self.prior, self.previous.clone(), self.config.clone());
         let started = tokio::task::spawn_blocking(move || {
             Identification::start(&sequence, &vehicle, prior, previous.as_ref(), &config)
         })
         .await??;
-        let mut identification = match started {
-            Started::Running(run) => run,
-            Started::Refused(outcome) => return Ok(*outcome),
+        let outcome = match started {
+            Started::Running(run) => self.turns(run).await?,
+            Started::Refused(outcome) => *outcome,
         };
-        let mut next = identification.candidate().cloned().map(Next::Candidate);
+        let text = if outcome.accepted { "accepted" } else { "rejected" };
+        self.step(&outcome.key, Progress::FINISHED, outcome.history.last(), text.to_owned()).await;
+        Ok(outcome)
+    }
+
+    /// Turn by turn, to the outcome.
+    async fn turns(&mut self, mut run: Box<Identification>) -> Result<Outcome, RunError> {
+        let mut candidate = run.candidate().cloned().ok_or(IdentificationError::Ended)?;
         loop {
-            let candidate = match next {
-                Some(Next::Candidate(candidate)) => candidate,
-                Some(Next::Done(outcome)) => {
-                    let text = if outcome.accepted { "accepted" } else { "rejected" };
-                    self.step(&outcome.key, Progress::FINISHED, &identification, start, text.to_owned())
-                        .await;
-                    return Ok(*outcome);
+            let (key, last) = (&candidate.key, run.history().last());
+            let text = |what: &str| format!("iteration {}: {what}", key.iteration + 1);
+            self.step(key, Progress::TRAINING, last, text("learning the residual")).await;
+            let model = match self.model_for(&candidate).await {
+                Err(error) => {
+                    self.step(key, Progress::GIVEN_UP, last, error.to_string()).await;
+                    return Err(error);
                 }
-                None => return Err(IdentificationError::Ended.into()),
+                Ok(model) => model,
             };
-            let iteration = candidate.key.iteration + 1;
-            let text = format!("iteration {iteration}: learning the residual");
-            self.step(&candidate.key, Progress::TRAINING, &identification, start, text).await;
-            let model = self.model_for(&candidate).await?;
-            let text = format!("iteration {iteration}: virtual test and fit");
-            self.step(&candidate.key, Progress::FITTING, &identification, start, text).await;
-            let (back, advanced) = tokio::task::spawn_blocking(move || {
-                let next = identification.advance(&model);
-                (identification, next)
+            self.step(key, Progress::SWEEPING, last, text("virtual test")).await;
+            let last = last.cloned();
+            let (back, swept) = tokio::task::spawn_blocking(move || {
+                let swept = run.sweep(&model);
+                (run, swept)
             })
             .await?;
-            identification = back;
-            next = Some(advanced?);
+            let (mut back, swept) = (back, swept?);
+            self.step(key, Progress::FITTING, last.as_ref(), text("fitting the tires")).await;
+            let (back, next) = tokio::task::spawn_blocking(move || {
+                let next = back.advance(&swept);
+                (back, next)
+            })
+            .await?;
+            run = back;
+            match next? {
+                Next::Candidate(next) => candidate = next,
+                Next::Done(outcome) => return Ok(*outcome),
+            }
         }
     }
 
@@ -112,10 +129,9 @@ impl Run<'_> {
         }
     }
 
-    async fn step(&self, key: &RunKey, stage: u8, run: &Identification, start: Instant, text: String) {
+    async fn step(&self, key: &RunKey, stage: u8, last: Option<&IterationRecord>, text: String) {
         (self.on_step)(&text);
-        let last = run.history().last();
-        let (sequence, config, elapsed) = (&*self.sequence, &self.config, start.elapsed());
+        let (sequence, config, elapsed) = (&*self.sequence, &self.config, self.start.elapsed());
         self.outputs.progress(&Step { key, sequence, config, stage, last, elapsed, text }).await;
     }
 }

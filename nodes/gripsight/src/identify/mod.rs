@@ -203,7 +203,6 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
     let mut last = None;
     let mut windows = Windows::default();
     for sequence in &sequences {
-        windows.look(sequence, &vehicle, previous.as_ref())?;
         let mut stages = progress.run(&config);
         let result =
             identify(sequence, &vehicle, prior, previous.as_ref(), &config, &mut |stage| stages.enter(stage))
@@ -212,7 +211,7 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
         let writing = Instant::now();
         let files = write(args, &vehicle, &notes, sequence, &result)?;
         timing.writing_s += writing.elapsed().as_secs_f64();
-        windows.add(sequence, &result);
+        windows.add(sequence, &result, previous.as_ref());
         previous = result.accepted_set().or(previous);
         last = Some((result, files));
     }

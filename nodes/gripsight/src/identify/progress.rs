@@ -19,8 +19,10 @@ pub(super) struct Timing {
     pub(super) preparing_s: f64,
     /// Training the residual networks.
     pub(super) training_s: f64,
-    /// The virtual steering sweeps, the fits to them and the final judgement.
-    pub(super) sweep_and_fit_s: f64,
+    /// The virtual steering sweeps.
+    pub(super) sweep_s: f64,
+    /// The fits to them and the final judgement.
+    pub(super) fit_s: f64,
     /// Writing the files, lookup table and report included.
     pub(super) writing_s: f64,
 }
@@ -30,7 +32,8 @@ impl Timing {
     pub(super) fn add(&mut self, other: &Self) {
         self.preparing_s += other.preparing_s;
         self.training_s += other.training_s;
-        self.sweep_and_fit_s += other.sweep_and_fit_s;
+        self.sweep_s += other.sweep_s;
+        self.fit_s += other.fit_s;
     }
 }
 
@@ -81,7 +84,8 @@ impl Stages<'_> {
                 let loss = if loss.is_finite() { format!(", loss {loss:.3}") } else { String::new() };
                 format!("turn {iteration}: learning the residual{loss}")
             }
-            Stage::Fitting { iteration } => format!("turn {iteration}: steering sweep and fit"),
+            Stage::Sweeping { iteration } => format!("turn {iteration}: steering sweep"),
+            Stage::Fitting { iteration } => format!("turn {iteration}: fitting the tires"),
         };
         let begins = !matches!(stage, Stage::Training { epoch, .. } if epoch > 0);
         if begins && self.bar.is_hidden() {
@@ -104,7 +108,8 @@ impl Stages<'_> {
         *match self.stage {
             Stage::Preparing => &mut self.timing.preparing_s,
             Stage::Training { .. } => &mut self.timing.training_s,
-            Stage::Fitting { .. } => &mut self.timing.sweep_and_fit_s,
+            Stage::Sweeping { .. } => &mut self.timing.sweep_s,
+            Stage::Fitting { .. } => &mut self.timing.fit_s,
         } += spent_s;
     }
 }

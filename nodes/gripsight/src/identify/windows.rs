@@ -4,48 +4,31 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use gripsight_identification::{AcceptedSet, Monitor, Outcome, Reading};
+use gripsight_identification::{AcceptedSet, Outcome, Reading};
 use gripsight_signals::{NS_PER_S, StateSequence};
-use gripsight_vehicle::VehicleParameters;
 
 /// The windows of a run, in their order.
 #[derive(Debug, Default)]
 pub(super) struct Windows {
     /// Stamp of the first sample of all.
     start_ns: Option<i64>,
-    /// What the set in use looked like on the window that comes next.
-    reading: Option<Reading>,
     lines: String,
     notices: String,
 }
 
 impl Windows {
-    /// Looks whether the set in use still fits; what cannot be looked at tells nothing.
-    pub(super) fn look(
-        &mut self,
-        sequence: &StateSequence,
-        vehicle: &VehicleParameters,
-        set: Option<&AcceptedSet>,
-    ) -> anyhow::Result<()> {
+    /// Takes down what a window gave, and whether the set in use before still fitted it.
+    pub(super) fn add(&mut self, sequence: &StateSequence, result: &Outcome, set: Option<&AcceptedSet>) {
         let start_ns = *self.start_ns.get_or_insert(sequence.start_stamp_ns);
-        let Some(set) = set else { return Ok(()) };
-        self.reading = Monitor::new(vehicle, set)?
-            .look(sequence)
-            .inspect_err(|error| tracing::debug!("the set in use was not looked at: {error}"))
-            .ok();
-        if let Some(reading) = &self.reading
+        let from_s = seconds(sequence.start_stamp_ns - start_ns);
+        if let (Some(reading), Some(set)) = (&result.grip, set)
             && let Some(notice) = reading.notice(set)
         {
-            let notice = format!("{:.1} s: {notice}", seconds(reading.stamp_ns - start_ns));
+            let [now_s, since_s] = [reading.stamp_ns, reading.since_ns].map(|ns| seconds(ns - start_ns));
+            let notice = format!("{now_s:.1} s: {notice}, since {since_s:.1} s");
             tracing::warn!("{notice}");
             let _ = writeln!(self.notices, "{notice}");
         }
-        Ok(())
-    }
-
-    /// Takes down what a window gave.
-    pub(super) fn add(&mut self, sequence: &StateSequence, result: &Outcome) {
-        let from_s = seconds(sequence.start_stamp_ns - self.start_ns.unwrap_or(sequence.start_stamp_ns));
         let (k, d) = (&result.cornering_stiffness_n_per_rad, &result.peak_friction);
         let _ = write!(
             self.lines,
@@ -59,7 +42,7 @@ impl Windows {
             d.front.reached,
             d.rear.reached
         );
-        let _ = match self.reading.take() {
+        let _ = match &result.grip {
             Some(Reading { error_ratio, peak_factor, changed, .. }) => writeln!(
                 self.lines,
                 "{error_ratio:.3},{:.4},{:.4},{changed}",

@@ -27,6 +27,7 @@ struct Verdict {
 /// Fills in verdict, reasons and advice.
 pub(crate) fn judge(run: &Identification, outcome: &mut Outcome) {
     let mut verdict = Verdict::default();
+    changed_grip(run, outcome, &mut verdict);
     let shape = bounds(outcome, &mut verdict);
     lateral_velocity(outcome, &mut verdict);
     prediction(run, outcome, &mut verdict);
@@ -38,6 +39,18 @@ pub(crate) fn judge(run: &Identification, outcome: &mut Outcome) {
     outcome.accepted = verdict.against.is_empty();
     outcome.reasons = verdict.against.into_iter().chain(verdict.remarks).collect();
     outcome.drive_next = verdict.drive;
+}
+
+/// What became of the previous set's grip.
+fn changed_grip(run: &Identification, outcome: &Outcome, verdict: &mut Verdict) {
+    if let (Some(set), Some(reading)) = (&run.previous, &outcome.grip)
+        && let Some(notice) = reading.notice(set)
+    {
+        let left_s = run.data.windows.iter().map(|(w, _)| w.len as f64 * run.data.dt_s).sum::<f64>();
+        verdict.remarks.push(format!(
+            "{notice}; tires fitted to the {left_s:.1} s driven since, with that as D's prior"
+        ));
+    }
 }
 
 /// Parameters that are not finite or on a bound; returns the C and E among them.

@@ -2,10 +2,11 @@
 
 use std::fmt;
 
+use gripsight_signals::StateSequence;
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 use serde::{Deserialize, Serialize};
 
-use crate::Nuisance;
+use crate::{Config, Nuisance};
 
 /// An estimate with its 90 % interval; ends that are not known are NaN (null in JSON).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -146,6 +147,20 @@ pub struct RunKey {
     pub vehicle_hash: String,
     /// Seed of everything random in the run.
     pub seed: u64,
+}
+
+impl RunKey {
+    /// The key of a run as it begins.
+    #[must_use]
+    pub fn first(sequence: &StateSequence, vehicle: &VehicleParameters, config: &Config) -> Self {
+        Self {
+            run_id: config.run_id.clone(),
+            sequence_id: sequence.sequence_id,
+            iteration: 0,
+            vehicle_hash: vehicle_hash(vehicle),
+            seed: config.seed,
+        }
+    }
 }
 
 impl fmt::Display for RunKey {

@@ -79,6 +79,7 @@ pub(crate) fn refused(
         history: Vec::new(),
         curves: PerAxle::default(),
         prior: request.prior,
+        grip: None,
         health: health.clone(),
         drive_next,
         key: request.key.clone(),
@@ -156,6 +157,7 @@ pub(crate) fn conclude(run: &Identification, converged: bool) -> Outcome {
         history: run.history.clone(),
         curves: curves(run, &phi_p),
         prior: run.prior,
+        grip: run.grip.clone(),
         health: run.data.health.clone(),
         drive_next: Vec::new(),
         key,
@@ -174,6 +176,10 @@ fn choose(run: &Identification) -> (PacejkaParameters, Source) {
     if run.config.method == crate::Method::Paper {
         let best = run.history.iter().min_by(|a, b| a.residual_left.total_cmp(&b.residual_left));
         return (best.map_or(run.initial, |turn| turn.phi_p), by_loop);
+    }
+    // A network learns from the whole sequence, the old road and what is held back of the new one included.
+    if run.grip.as_ref().is_some_and(|reading| reading.changed) {
+        return (run.direct.tires, Source::LeastSquares);
     }
     let best = run.history.iter().min_by(|a, b| a.validation_rmse.total_cmp(&b.validation_rmse));
     let better = |tires: &PacejkaParameters, validation_rmse: f64| {

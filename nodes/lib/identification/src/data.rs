@@ -77,8 +77,7 @@ impl Data {
             segments.iter().flat_map(|s| &s.v_x_mps).copied().filter(|&v| v > SLOW_MPS).collect();
         let slow_mps = SLOW_MPS.max(SLOW_SHARE * median(&mut speeds).unwrap_or(0.0));
         let stretches = moving_stretches(&segments, slow_mps, len);
-        let per_block = (BLOCK_S / (len as f64 * dt_s)).round().max(1.0) as usize;
-        let windows: Vec<(Window, Part)> = stretches
+        let windows: Vec<Window> = stretches
             .iter()
             .flat_map(|s| {
                 tile(&[s.len], len).into_iter().map(|w| Window {
@@ -87,8 +86,6 @@ impl Data {
                     ..w
                 })
             })
-            .enumerate()
-            .map(|(i, w)| (w, PATTERN[i / per_block % PATTERN.len()]))
             .collect();
         if windows.len() < min_windows {
             return Err(IdentificationError::TooLittle {
@@ -98,21 +95,42 @@ impl Data {
                 drive: "drive some laps without stopping",
             });
         }
-        let driven =
-            || windows.iter().flat_map(|(w, _)| &segments[w.segment].v_x_mps[w.from..w.from + w.len]);
-        let mean_speed_mps = driven().sum::<f64>() / driven().count() as f64;
         let a_x_mps2 = segments.iter().map(forward_acceleration).collect();
         let noise = [noise_of(&segments, |s| &s.v_y_mps), noise_of(&segments, |s| &s.yaw_rate_radps)];
-        Ok(Self {
+        let mut data = Self {
             health: health.clone(),
             segments,
             dt_s,
             stretches,
-            windows,
-            mean_speed_mps,
+            windows: Vec::new(),
+            mean_speed_mps: f64::NAN,
             a_x_mps2,
             noise,
-        })
+        };
+        data.share_out(&windows);
+        Ok(data)
+    }
+
+    /// Leaves out what lies before a time, but for the shortest drive that can be fitted.
+    pub(crate) fn leave_out_before(&mut self, time_s: f64) {
+        let begin_s = |w: &Window| {
+            let segment = &self.segments[w.segment];
+            segment.start_time_s + w.from as f64 * segment.dt_s
+        };
+        let after = self.windows.iter().filter(|(w, _)| begin_s(w) >= time_s - 1e-6).count().max(MIN_WINDOWS);
+        let windows: Vec<Window> = self.windows.iter().map(|(w, _)| *w).collect();
+        self.share_out(&windows[windows.len().saturating_sub(after)..]);
+    }
+
+    /// Gives the windows their parts. Every part gets some, however short the drive.
+    fn share_out(&mut self, windows: &[Window]) {
+        let len_s = windows.first().map_or(WINDOW_S, |w| w.len as f64 * self.dt_s);
+        let per_block = (BLOCK_S / len_s).round() as usize;
+        let per_block = per_block.min(windows.len() / PATTERN.len()).max(1);
+        let part = |i: usize| PATTERN[i / per_block % PATTERN.len()];
+        self.windows = windows.iter().enumerate().map(|(i, w)| (*w, part(i))).collect();
+        let speeds: Vec<f64> = self.samples(|s, k| s.v_x_mps[k]).collect();
+        self.mean_speed_mps = speeds.iter().sum::<f64>() / speeds.len() as f64;
     }
 
     /// Whether there is a heading, which tells the yaw rate's bias.

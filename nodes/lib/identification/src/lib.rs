@@ -23,6 +23,7 @@ mod residual_model;
 mod rollout;
 mod run;
 pub mod shooting;
+mod start;
 mod sweep;
 pub mod tires;
 
@@ -40,4 +41,4 @@ pub use outcome::{
 pub use residual::train_residual;
 pub use residual_model::{INPUTS, OUTPUTS, ResidualModel};
 pub use rollout::Nuisance;
-pub use run::{Identification, Next, Stage, Started, identify};
+pub use run::{Identification, Next, Stage, Started, Swept, identify};

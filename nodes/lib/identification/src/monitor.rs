@@ -1,17 +1,19 @@
 //! Watches the set in use: does it still fit what the car does, and if not, what became of the grip?
 //!
 //! On the last seconds of each window of telemetry the peak factors D of both axles are fitted anew, everything else held at the accepted set. A change that is
-//! both larger than its uncertainty and worth acting on is a notice; small corners tell nothing and give none.
+//! both larger than its uncertainty and worth acting on is a notice; small corners tell nothing and give none. Where the change lies is where the
+//! windows before fit best with the old D and those after it with the new: a run that is told of a change leaves out what lies before it.
 
 use gripsight_signals::{DataHealth, StateSequence};
 use gripsight_vehicle::VehicleParameters;
+use serde::Serialize;
 
 use crate::data::Data;
 use crate::judge::rollout_errors;
 use crate::rollout::{TireRollout, vector_of};
 use crate::shooting::{Parameter, Problem, Window, fit};
 use crate::tires::D_BOUNDS;
-use crate::{AcceptedSet, Estimate, IdentificationError, PerAxle, vehicle_hash};
+use crate::{AcceptedSet, Estimate, FrictionPrior, IdentificationError, PerAxle, vehicle_hash};
 
 /// Smallest change of D that is worth a notice, as a share of it.
 const NOTICEABLE: f64 = 0.08;
@@ -25,7 +27,7 @@ const WINDOWS: usize = 4;
 const ROBUST_K: f64 = 3.0;
 
 /// What a look at the latest telemetry gave.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Reading {
     /// End of the telemetry looked at, in nanoseconds.
     pub stamp_ns: i64,
@@ -35,6 +37,8 @@ pub struct Reading {
     pub peak_factor: PerAxle<Estimate>,
     /// Whether the grip has changed: identify anew.
     pub changed: bool,
+    /// From here on the telemetry fits better with that peak factor than with the set in use, in nanoseconds: where the grip changed, if it has.
+    pub since_ns: i64,
 }
 
 impl Reading {
@@ -47,6 +51,17 @@ impl Reading {
                 "the grip has changed: D {:.2} -> {:.2} front, {:.2} -> {:.2} rear",
                 then.front.d, now.front.value, then.rear.d, now.rear.value
             )
+        })
+    }
+
+    /// What the change says of the road, if there was one: the tires' shape is the old one, so the force below the peak tells the peak.
+    pub(crate) fn prior(&self) -> Option<FrictionPrior> {
+        let PerAxle { front, rear } = self.peak_factor;
+        let sigma = [front, rear].map(|d| (d.high - d.value) / Estimate::Z90);
+        let apart = 0.5 * (front.value - rear.value).abs();
+        self.changed.then(|| FrictionPrior {
+            mu: 0.5 * (front.value + rear.value),
+            sigma: sigma.into_iter().fold(apart, f64::max),
         })
     }
 }
@@ -76,14 +91,20 @@ impl Monitor {
     /// # Errors
     /// [`IdentificationError`] for telemetry that is malformed, frozen or holds less than 2.4 s of driving.
     pub fn look(&self, sequence: &StateSequence) -> Result<Reading, IdentificationError> {
-        let data = Data::new(sequence, &self.vehicle, &DataHealth::of(sequence)?, WINDOWS)?;
-        let model = TireRollout::new(&self.vehicle, &data);
+        self.read(&Data::new(sequence, &self.vehicle, &DataHealth::of(sequence)?, WINDOWS)?, sequence)
+    }
+
+    /// The same with the telemetry made ready.
+    pub(crate) fn read(&self, data: &Data, sequence: &StateSequence) -> Result<Reading, IdentificationError> {
+        let model = TireRollout::new(&self.vehicle, data);
         let from_s = sequence.duration_s() - LOOK_S;
-        let late = |w: &Window| {
+        let begin_s = |w: &Window| {
             let segment = &data.segments[w.segment];
-            segment.start_time_s + w.from as f64 * segment.dt_s >= from_s
+            segment.start_time_s + w.from as f64 * segment.dt_s
         };
-        let windows: Vec<Window> = data.windows.iter().map(|(w, _)| *w).filter(late).collect();
+        let late = |w: &Window| begin_s(w) >= from_s;
+        let all: Vec<Window> = data.windows.iter().map(|(w, _)| *w).collect();
+        let windows: Vec<Window> = all.iter().copied().filter(late).collect();
         if windows.len() < WINDOWS {
             let length_s = windows.first().map_or(0.0, |w| w.len as f64 * data.dt_s);
             return Err(IdentificationError::TooLittle {
@@ -95,36 +116,60 @@ impl Monitor {
         }
         let p = vector_of(&self.set.phi_p, &self.set.corrections, &self.set.nuisance);
         let sigma = self.set.rollout_rmse.map(|s| s.max(1e-6));
-        let parameters: Vec<Parameter> = p
-            .iter()
-            .enumerate()
-            .map(|(j, &start)| {
-                let free = j == 2 || j == 6;
+        let solve = |p: &[f64], windows: &[Window], peaks_free: bool| {
+            let parameter = |(j, &start): (usize, &f64)| {
+                let free = peaks_free && (j == 2 || j == 6);
                 let (low, high) = if free { D_BOUNDS } else { (f64::NEG_INFINITY, f64::INFINITY) };
                 Parameter { start, low, high, free, prior: None }
-            })
-            .collect();
-        let problem = Problem {
-            model: &model,
-            windows: &windows,
-            sigma: &sigma,
-            parameters: &parameters,
-            robust_k: ROBUST_K,
-            max_iterations: 15,
+            };
+            let parameters: Vec<Parameter> = p.iter().enumerate().map(parameter).collect();
+            let problem = Problem {
+                model: &model,
+                windows,
+                sigma: &sigma,
+                parameters: &parameters,
+                robust_k: ROBUST_K,
+                max_iterations: 15,
+            };
+            fit(&problem, None)
         };
-        let found = fit(&problem, None);
+        let found = solve(&p, &windows, true);
+        let costs = |p: &[f64]| solve(p, &all, false).linearization.window_costs;
+        let since = change(&costs(&p), &costs(&found.parameters));
         let axle = |j: usize| (found.parameters[j], found.standard_error(j), p[j]);
         let differs = |(now, error, then): (f64, Option<f64>, f64)| {
             let change = (now - then).abs();
             error.is_some_and(|e| change > SIGNIFICANT * e) && change > NOTICEABLE * then
         };
-        let end_ns = (sequence.duration_s() * gripsight_signals::NS_PER_S) as i64;
+        let stamp_ns = |time_s: f64| sequence.start_stamp_ns + (time_s * gripsight_signals::NS_PER_S) as i64;
         Ok(Reading {
-            stamp_ns: sequence.start_stamp_ns + end_ns,
+            stamp_ns: stamp_ns(sequence.duration_s()),
+            since_ns: stamp_ns(all.get(since).map_or(from_s, begin_s)),
             error_ratio: rollout_errors(&model, &p, &windows, &sigma).normalized,
             peak_factor: PerAxle { front: axle(2), rear: axle(6) }
                 .map(|(now, error, _)| Estimate::from_error(now, error)),
             changed: differs(axle(2)) || differs(axle(6)),
         })
+    }
+}
+
+/// First window of the rest that fits best with the new tires against the old, from what either costs in each window.
+fn change(old: &[f64], new: &[f64]) -> usize {
+    let (mut gain, mut best, mut at) = (0.0, 0.0, old.len());
+    for (k, (old, new)) in old.iter().zip(new).enumerate().rev() {
+        gain += old - new;
+        if gain > best {
+            (best, at) = (gain, k);
+        }
+    }
+    at
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_change_lies_where_the_new_tires_begin_to_fit_better() {
+        assert_eq!(super::change(&[1.0, 1.0, 5.0, 1.5, 6.0], &[3.0, 2.0, 1.0, 2.0, 1.0]), 2);
+        assert_eq!(super::change(&[1.0, 1.0], &[2.0, 2.0]), 2);
     }
 }

@@ -5,7 +5,8 @@ use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 use serde::Serialize;
 
 use crate::{
-    AcceptedSet, Config, Estimate, FrictionPrior, Nuisance, PerAxle, Range, RunKey, SignalCorrections,
+    AcceptedSet, Config, Estimate, FrictionPrior, Nuisance, PerAxle, Range, Reading, RunKey,
+    SignalCorrections,
 };
 
 /// Peak friction of one axle, and what the value rests on.
@@ -248,8 +249,10 @@ pub struct Outcome {
     pub history: Vec<IterationRecord>,
     /// Curves for the report.
     pub curves: PerAxle<TireCurve>,
-    /// The friction prior that was used.
+    /// The friction prior that was used: what was given; or, where the grip has changed, what the monitor read.
     pub prior: Option<FrictionPrior>,
+    /// Whether the previous set still fits; `None` without one.
+    pub grip: Option<Reading>,
     /// What is wrong with the data.
     pub health: DataHealth,
     /// The driving that would help most.

@@ -1,14 +1,14 @@
 //! One run as a state machine that the offline loop and the live node share.
 //!
 //! ```text
-//! start ──> candidate 0 ──> train_residual ──> advance ──> candidate 1 ──> ... ──> advance ──> outcome
+//! start ──> candidate 0 ──> train_residual ──> sweep ──> advance ──> candidate 1 ──> ... ──> advance ──> outcome
 //! ```
 //!
 //! Live, `train_residual` runs in another node; [`identify`] does both in a loop. Every step is a pure function of its arguments.
 
 use std::ops::ControlFlow;
 
-use gripsight_signals::{DataHealth, Excitation, StateSequence};
+use gripsight_signals::{DataHealth, Excitation, NS_PER_S, StateSequence};
 use gripsight_vehicle::{MagicFormula, PacejkaParameters, VehicleParameters};
 
 use crate::conclude::{Request, conclude, refused};
@@ -18,11 +18,12 @@ use crate::extract::extract;
 use crate::judge::rollout_errors;
 use crate::residual::left_over;
 use crate::rollout::{TireRollout, vector_of};
-use crate::sweep::{Point, sweep};
+use crate::start::{check, initial_tires};
+use crate::sweep::{Point, Sweep, sweep};
 use crate::tires::curve_change;
 use crate::{
-    AcceptedSet, Candidate, Config, FrictionPrior, IdentificationError, IterationRecord, Method, Outcome,
-    PerAxle, ResidualModel, RunKey, train_residual, vehicle_hash,
+    AcceptedSet, Candidate, Config, FrictionPrior, IdentificationError, IterationRecord, Method, Monitor,
+    Outcome, PerAxle, Reading, ResidualModel, RunKey, train_residual,
 };
 
 /// What a run wants next.
@@ -59,11 +60,25 @@ pub enum Stage {
         /// Validation loss after the epoch; NaN before the first.
         loss: f64,
     },
-    /// The virtual steady-state test is driven and tires are fitted to it.
+    /// The virtual steady-state test is driven.
+    Sweeping {
+        /// Turn of the outer loop, from 1.
+        iteration: u32,
+    },
+    /// Tires are fitted to what it showed, and judged.
     Fitting {
         /// Turn of the outer loop, from 1.
         iteration: u32,
     },
+}
+
+/// What the virtual steady-state test of a candidate with its residual model showed: see [`Identification::sweep`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Swept {
+    key: RunKey,
+    sweep: Sweep,
+    epochs: usize,
+    residual_loss: f64,
 }
 
 /// An identification under way.
@@ -73,6 +88,8 @@ pub struct Identification {
     pub(crate) vehicle: VehicleParameters,
     pub(crate) prior: Option<FrictionPrior>,
     pub(crate) previous: Option<AcceptedSet>,
+    /// Whether the previous set still fits.
+    pub(crate) grip: Option<Reading>,
     pub(crate) config: Config,
     pub(crate) initial: PacejkaParameters,
     pub(crate) direct: Direct,
@@ -91,7 +108,8 @@ impl Identification {
     /// accepted, with reasons.
     ///
     /// `prior` starts D and holds it where the peak is not reached; `previous` is where the run starts (warm start) and what the result
-    /// has to beat.
+    /// has to beat. Where the telemetry shows that the grip is no longer that of `previous`, what lies before the change is left out, and D's prior
+    /// is what the last seconds say of it with the shape of the previous curves (not with the paper's method).
     ///
     /// # Errors
     /// [`IdentificationError`] for telemetry that is malformed or frozen, settings out of range, or a previous set of another car.
@@ -103,13 +121,7 @@ impl Identification {
         config: &Config,
     ) -> Result<Started, IdentificationError> {
         check(vehicle, prior, previous, config)?;
-        let key = RunKey {
-            run_id: config.run_id.clone(),
-            sequence_id: sequence.sequence_id,
-            iteration: 0,
-            vehicle_hash: vehicle_hash(vehicle),
-            seed: config.seed,
-        };
+        let key = RunKey::first(sequence, vehicle, config);
         let initial = initial_tires(prior, previous, config);
         let health = DataHealth::of(sequence)?;
         let refuse = |reason: String, drive: &str| {
@@ -119,12 +131,21 @@ impl Identification {
         if let Some(reason) = Excitation::of(sequence)?.insufficient {
             return Ok(refuse(reason, "drive corners both ways, at growing speed, for half a minute"));
         }
-        let data = match Data::new(sequence, vehicle, &health, MIN_WINDOWS) {
+        let mut data = match Data::new(sequence, vehicle, &health, MIN_WINDOWS) {
             Err(error @ IdentificationError::TooLittle { drive, .. }) => {
                 return Ok(refuse(error.to_string(), drive));
             }
             other => other?,
         };
+        let grip = match (previous, config.method) {
+            (Some(set), Method::Robust) => Monitor::new(vehicle, set)?.read(&data, sequence).ok(),
+            _ => None,
+        };
+        let mut prior = prior;
+        if let Some(change) = grip.as_ref().filter(|reading| reading.changed) {
+            data.leave_out_before((change.since_ns - sequence.start_stamp_ns) as f64 / NS_PER_S);
+            prior = change.prior().or(prior);
+        }
         let warm = previous.map(|p| (&p.phi_p, &p.corrections));
         let direct = direct(&data, vehicle, prior, warm)?;
         let phi_p = match config.method {
@@ -138,6 +159,7 @@ impl Identification {
             vehicle: vehicle.clone(),
             prior,
             previous: previous.cloned(),
+            grip,
             config: config.clone(),
             initial,
             direct,
@@ -164,20 +186,28 @@ impl Identification {
         &self.history
     }
 
-    /// Takes the residual model of the waiting candidate: drives the virtual test, fits the tires, and asks for the next or ends.
+    /// Drives the virtual test with the residual model of the waiting candidate.
     ///
     /// # Errors
     /// [`IdentificationError::WrongModel`] for a model that answers another candidate (the run goes on waiting),
     /// [`IdentificationError::Ended`] after the end, [`IdentificationError::Network`] for weights that do not fit.
-    pub fn advance(&mut self, model: &ResidualModel) -> Result<Next, IdentificationError> {
-        if self.ended {
-            return Err(IdentificationError::Ended);
-        }
-        if model.key != self.candidate.key || model.phi_p != self.candidate.phi_p {
-            let (expected, got) = (self.candidate.key.to_string(), model.key.to_string());
-            return Err(IdentificationError::WrongModel { expected, got });
-        }
-        let turn = self.turn(model)?;
+    pub fn sweep(&self, model: &ResidualModel) -> Result<Swept, IdentificationError> {
+        self.check_answer(&model.key, model.phi_p == self.candidate.phi_p)?;
+        Ok(Swept {
+            key: model.key.clone(),
+            sweep: sweep(&self.vehicle, model, self.candidate.mean_speed_mps, self.config.method)?,
+            epochs: model.epochs,
+            residual_loss: model.validation_loss,
+        })
+    }
+
+    /// Fits the tires to the virtual test, and asks for the next residual model or ends.
+    ///
+    /// # Errors
+    /// [`IdentificationError::WrongModel`] for the test of another candidate, [`IdentificationError::Ended`] after the end.
+    pub fn advance(&mut self, swept: &Swept) -> Result<Next, IdentificationError> {
+        self.check_answer(&swept.key, true)?;
+        let turn = self.turn(swept)?;
         let settled = turn.change < self.config.settled_below();
         self.candidate.phi_p = turn.phi_p;
         self.candidate.key.iteration = turn.iteration;
@@ -188,6 +218,17 @@ impl Identification {
             return Ok(Next::Done(Box::new(conclude(self, converged))));
         }
         Ok(Next::Candidate(self.candidate.clone()))
+    }
+
+    fn check_answer(&self, key: &RunKey, same_tires: bool) -> Result<(), IdentificationError> {
+        if self.ended {
+            return Err(IdentificationError::Ended);
+        }
+        if *key != self.candidate.key || !same_tires {
+            let (expected, got) = (self.candidate.key.to_string(), key.to_string());
+            return Err(IdentificationError::WrongModel { expected, got });
+        }
+        Ok(())
     }
 
     /// The paper's method ends where a turn leaves no less of the held-out data unexplained than the best before it; the robust one where the last
@@ -208,15 +249,15 @@ impl Identification {
     }
 
     /// One turn of the outer loop.
-    fn turn(&self, model: &ResidualModel) -> Result<IterationRecord, IdentificationError> {
-        let swept = sweep(&self.vehicle, model, self.candidate.mean_speed_mps, self.config.method)?;
+    fn turn(&self, swept: &Swept) -> Result<IterationRecord, IdentificationError> {
+        let Swept { sweep, epochs, residual_loss, .. } = swept;
         let robust = self.config.method == Method::Robust;
         let fit = |points: &[Point], start: &MagicFormula, reached: bool| {
             extract(points, start, robust && !reached, robust)
         };
         let (at, peak) = (&self.candidate.phi_p, &self.direct.peak);
-        let front = fit(&swept.points.front, &at.front, peak.front.reached)?;
-        let rear = fit(&swept.points.rear, &at.rear, peak.rear.reached)?;
+        let front = fit(&sweep.points.front, &at.front, peak.front.reached)?;
+        let rear = fit(&sweep.points.rear, &at.rear, peak.rear.reached)?;
         let phi_p = PacejkaParameters { front: front.axle, rear: rear.axle };
         let slips =
             PerAxle { front: self.direct.slips.front.range_rad, rear: self.direct.slips.rear.range_rad };
@@ -226,12 +267,12 @@ impl Identification {
             change: curve_change(at, &phi_p, &slips),
             fit_rmse: (0.5 * (front.rmse.powi(2) + rear.rmse.powi(2))).sqrt(),
             evaluations: front.evaluations + rear.evaluations,
-            sweep_speed_mps: swept.speed_mps,
-            extrapolated_share: swept.extrapolated_share,
+            sweep_speed_mps: sweep.speed_mps,
+            extrapolated_share: sweep.extrapolated_share,
             validation_rmse: self.validation_error(&phi_p),
             residual_left: self.residual_left(&phi_p),
-            epochs: model.epochs,
-            residual_loss: model.validation_loss,
+            epochs: *epochs,
+            residual_loss: *residual_loss,
         })
     }
 
@@ -259,58 +300,6 @@ impl Identification {
     }
 }
 
-/// Where a run starts: the previous set, or the configured tires with D from the friction prior where there is one. The paper's D_initial = mu_hat
-/// leaves B, C and E as they are; the robust method keeps the stiffness, of which a friction prior says nothing.
-fn initial_tires(
-    prior: Option<FrictionPrior>,
-    previous: Option<&AcceptedSet>,
-    config: &Config,
-) -> PacejkaParameters {
-    if let Some(previous) = previous {
-        return previous.phi_p;
-    }
-    let start = |axle: &MagicFormula| match (prior, config.method) {
-        (None, _) => *axle,
-        (Some(p), Method::Paper) => MagicFormula { d: p.mu, ..*axle },
-        (Some(p), Method::Robust) => {
-            MagicFormula::from_stiffness(axle.normalized_stiffness(), axle.c, p.mu, axle.e)
-        }
-    };
-    PacejkaParameters { front: start(&config.initial.front), rear: start(&config.initial.rear) }
-}
-
-fn check(
-    vehicle: &VehicleParameters,
-    prior: Option<FrictionPrior>,
-    previous: Option<&AcceptedSet>,
-    config: &Config,
-) -> Result<(), IdentificationError> {
-    let setting = |name, got, must| Err(IdentificationError::Setting { name, got, must });
-    if let Some(p) = prior {
-        let (low, high) = crate::tires::D_BOUNDS;
-        if !(low..=high).contains(&p.mu) {
-            return setting("friction prior mu", p.mu, "between 0.05 and 3.5");
-        }
-        if !(p.sigma.is_finite() && p.sigma > 0.0) {
-            return setting("friction prior sigma", p.sigma, "positive and finite");
-        }
-    }
-    if let Some(previous) = previous.filter(|p| p.vehicle_hash != vehicle_hash(vehicle)) {
-        let (expected, got) = (vehicle_hash(vehicle), previous.vehicle_hash.clone());
-        return Err(IdentificationError::OtherCar { expected, got });
-    }
-    if !config.initial.is_finite() {
-        return Err(IdentificationError::NotFinite { what: "initial tires" });
-    }
-    if config.max_iterations == 0 {
-        return setting("max_iterations", 0.0, "at least 1");
-    }
-    if !(config.tolerance.is_finite() && config.tolerance > 0.0) {
-        return setting("tolerance", config.tolerance, "positive and finite");
-    }
-    Ok(())
-}
-
 /// A whole run. `progress` is told what begins.
 ///
 /// # Errors
@@ -336,25 +325,11 @@ pub fn identify(
             progress(Stage::Training { iteration, epoch: p.epoch, epochs_max, loss: p.validation_loss });
             ControlFlow::Continue(())
         })?;
+        progress(Stage::Sweeping { iteration });
+        let swept = run.sweep(&model)?;
         progress(Stage::Fitting { iteration });
-        if let Next::Done(outcome) = run.advance(&model)? {
+        if let Next::Done(outcome) = run.advance(&swept)? {
             return Ok(*outcome);
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_prior_sets_d_alone_in_the_paper_s_method_and_keeps_the_stiffness_in_the_robust_one() {
-        let prior = Some(FrictionPrior { mu: 0.8, sigma: 0.1 });
-        let of = |prior, method| initial_tires(prior, None, &Config { method, ..Config::default() }).front;
-        let without = of(None, Method::Paper);
-        assert_eq!(of(prior, Method::Paper), MagicFormula { d: 0.8, ..without });
-        let robust = of(prior, Method::Robust);
-        assert!((robust.normalized_stiffness() - without.normalized_stiffness()).abs() < 1e-12);
-        assert_eq!((robust.c, robust.d, robust.e), (without.c, 0.8, without.e));
     }
 }

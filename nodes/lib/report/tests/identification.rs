@@ -114,6 +114,7 @@ fn outcome() -> Outcome {
             rear: curve(&config.initial.rear, &phi_p.rear),
         },
         prior: Some(FrictionPrior { mu: 0.6, sigma: 0.1 }),
+        grip: None,
         health: DataHealth {
             samples: 6000,
             duration_s: 59.99,

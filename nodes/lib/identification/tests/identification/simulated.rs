@@ -115,11 +115,16 @@ fn the_state_machine_is_the_whole_run_and_refuses_foreign_models() {
         let model = train_residual(&sequence, &vehicle, &candidate, &config, &mut go_on).unwrap();
         let mut foreign = model.clone();
         foreign.key.iteration += 1;
-        assert!(matches!(run.advance(&foreign), Err(IdentificationError::WrongModel { .. })));
-        match run.advance(&model).unwrap() {
-            Next::Candidate(next) => assert_eq!(next.key.iteration, candidate.key.iteration + 1),
+        assert!(matches!(run.sweep(&foreign), Err(IdentificationError::WrongModel { .. })));
+        let swept = run.sweep(&model).unwrap();
+        match run.advance(&swept).unwrap() {
+            Next::Candidate(next) => {
+                assert_eq!(next.key.iteration, candidate.key.iteration + 1);
+                assert!(matches!(run.advance(&swept), Err(IdentificationError::WrongModel { .. })));
+            }
             Next::Done(outcome) => {
-                assert!(matches!(run.advance(&model), Err(IdentificationError::Ended)));
+                assert!(matches!(run.sweep(&model), Err(IdentificationError::Ended)));
+                assert!(matches!(run.advance(&swept), Err(IdentificationError::Ended)));
                 break *outcome;
             }
         }

@@ -1,0 +1,33 @@
+//! A road whose friction changes while the car is watched.
+
+use gripsight_identification::{Config, PerAxle, ResidualKind, identify};
+use gripsight_reference_car::Friction;
+
+use crate::support::{drive, scenario, with_background};
+
+#[test]
+fn after_a_change_of_grip_the_new_road_is_identified_and_accepted_though_its_peak_is_not_reached() {
+    let config = Config { residual: ResidualKind::None, ..Config::default() };
+    let on = |friction, seed| {
+        drive(with_background(scenario("formula_student", "club", 0.7, 0.92, seed)).friction(friction))
+    };
+    let (_, sequence, vehicle) = on(Friction::Uniform { mu: 0.7 }, 41);
+    let outcome = identify(&sequence, &vehicle, None, None, &config, &mut |_| {}).unwrap();
+    let set = outcome.accepted_set().unwrap_or_else(|| panic!("{:?}", outcome.reasons));
+    assert!(outcome.grip.is_none());
+
+    let (_, changing, _) = on(Friction::Changing { mu: 0.7, mu_after: 0.9, at_s: 14.0, over_s: 0.1 }, 43);
+    let next = identify(&changing, &vehicle, None, Some(&set), &config, &mut |_| {}).unwrap();
+    let grip = next.grip.unwrap();
+    let since_s = (grip.since_ns - changing.start_stamp_ns) as f64 * 1e-9;
+    assert!(grip.changed && (since_s - 14.0).abs() < 2.0, "{since_s} s: {grip:?}");
+    assert!(next.accepted && next.reasons[0].starts_with("the grip has changed"), "{:?}", next.reasons);
+    let PerAxle { front, rear } = next.peak_friction;
+    for (now, before) in [(front.value, set.phi_p.front.d), (rear.value, set.phi_p.rear.d)] {
+        approx::assert_relative_eq!(now / before, 0.9 / 0.7, max_relative = 0.08);
+    }
+
+    let (_, same, _) = on(Friction::Uniform { mu: 0.7 }, 45);
+    let again = identify(&same, &vehicle, None, Some(&set), &config, &mut |_| {}).unwrap();
+    assert!(!again.grip.unwrap().changed && again.prior.is_none());
+}
