@@ -154,7 +154,7 @@ fn explain(
     let budget = Budget::of(&engine, &scorer, &windows, &models);
     let (verdict, mut reasons) = decide(&budget, &claims, &remains, &costs);
     reasons.extend(noise::caveat(&recording));
-    let effects = rank(&claims, [&model, &state], blocks, &last, &budget);
+    let effects = rank(&engine, &claims, [&model, &state], blocks, &last, &budget);
     let scored_windows =
         if windows.held_out.windows.is_empty() { &windows.training } else { &windows.held_out };
     let on_all = split(&recording, false).training;

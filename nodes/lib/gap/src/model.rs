@@ -326,4 +326,32 @@ mod tests {
             assert!(run(&[effect], 5.0) != plain, "{}", effect.name());
         }
     }
+
+    #[test]
+    fn what_pushes_along_the_road_turns_the_wheels_too_and_a_command_has_that_in_it() {
+        const TURNED: f64 = 1.06;
+        let vehicle = VehicleParameters::f1tenth();
+        let window = Window { segment: 0, from: 120, len: 2 };
+        let a_x_mps2 = |effects: &[EffectId], own: &[f64], more_mps2: f64| {
+            let mut recording = Recording { has_command: true, ..recording(4) };
+            recording.runs[0].force_x_mps2.iter_mut().for_each(|force| *force += more_mps2);
+            let model = ExtendedModel::new(&recording, &vehicle, effects, 0.0025);
+            let mut p = tires_to_parameters(&tires()).to_vec();
+            p.push(0.0);
+            p.extend(own);
+            model.predict(&p, [0.05, 0.4], &window).a_x_mps2[0]
+        };
+        let plain = a_x_mps2(&[], &[], 0.0);
+        let more = |effect, own: &[f64]| a_x_mps2(&[effect], own, 0.0) - plain;
+        approx::assert_relative_eq!(a_x_mps2(&[], &[], 1.0) - plain, 1.0, epsilon = 1e-9);
+        let resistance = more(EffectId::RollingResistance, &[0.03]);
+        approx::assert_relative_eq!(resistance, -0.03 * 9.81 / TURNED, epsilon = 1e-9);
+        // An accelerometer on a slope feels what holds the wheels back.
+        let slope = more(EffectId::RoadSlope, &[0.05, 0.0, 0.0]);
+        approx::assert_relative_eq!(slope, 9.81 * 0.05_f64.sin() * (1.0 - 1.0 / TURNED), epsilon = 1e-9);
+        // A mass that the file does not know makes the same command do less; the wheels are as they were.
+        let mass =
+            a_x_mps2(&[EffectId::MassError], &[1.1], 1.0) - a_x_mps2(&[EffectId::MassError], &[1.1], 0.0);
+        approx::assert_relative_eq!(mass, TURNED / 1.16, epsilon = 1e-9);
+    }
 }

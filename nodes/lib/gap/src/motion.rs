@@ -15,6 +15,9 @@ use crate::terms::{Axle, Axles, Car, Lag, Moment, Motion, Outputs};
 const MIN_SPEED_MPS: f64 = 0.2;
 /// Time in which the body follows the lateral acceleration in roll.
 const ROLL_TIME_S: f64 = 0.08;
+/// What the inertia of the turning wheels adds to the mass along the road, as a share of it. A command speaks of the car's own acceleration:
+/// the wheels' is on top of it, and everything else that pushes has to turn them, too. Wong, Theory of Ground Vehicles, section 3.1: 1.04 and more.
+const TURNING_SHARE: f64 = 0.06;
 
 /// Runs the car over one window.
 pub(crate) struct Mover<'m, 'a, T> {
@@ -284,8 +287,8 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         let front_use = force(&axles.front, &self.tires.front, slip_rad[0]);
         let rear_use = force(&axles.rear, &self.tires.rear, slip_rad[1]);
         let (sin, cos) = now.steering_rad.sin_cos();
-        let front_n = front_use * axles.front.load_n;
-        let rear_n = rear_use * axles.rear.load_n;
+        let front_n = front_use * axles.front.carried_n(self.axles_at_rest.front.load_n);
+        let rear_n = rear_use * axles.rear.carried_n(self.axles_at_rest.rear.load_n);
         let mut motion = Motion::none();
         for (effect, values) in model.with_parameters(self.p) {
             effect.motion(values, car, &at, &mut motion);
@@ -318,10 +321,13 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
             motion.gravity_x_mps2 += push.gravity_x_mps2;
             motion.gravity_y_mps2 += push.gravity_y_mps2;
         }
-        let a_x = if commanded {
-            (-(front_n * sin) + now.force_x_mps2 * car.nominal_mass_kg) / car.mass_kg + motion.force_x_mps2
+        let along_mps2 = if commanded {
+            let turning_kg = TURNING_SHARE * car.nominal_mass_kg;
+            let commanded_n = now.force_x_mps2 * (car.nominal_mass_kg + turning_kg);
+            let pushed_mps2 = motion.force_x_mps2 + motion.gravity_x_mps2;
+            (-(front_n * sin) + pushed_mps2 * car.mass_kg + commanded_n) / (car.mass_kg + turning_kg)
         } else {
-            T::from(now.a_x_mps2)
+            motion.gravity_x_mps2 + now.a_x_mps2
         };
         let rolled = if self.rolls && h_s > 0.0 {
             Lag::new(h_s, T::from(ROLL_TIME_S)).step(memory.rolled_a_y_mps2, memory.a_y_mps2, a_y)
@@ -331,9 +337,9 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         Rates {
             v_y_mps2: a_y - now.v_x_mps * r + motion.gravity_y_mps2,
             yaw_radps2,
-            v_x_mps2: a_x + v_y * r + motion.gravity_x_mps2,
+            v_x_mps2: along_mps2 + v_y * r,
             a_y_mps2: a_y,
-            a_x_mps2: a_x,
+            a_x_mps2: along_mps2 - motion.gravity_x_mps2,
             memory: Memory { a_y_mps2: a_y, rolled_a_y_mps2: rolled, front_use, slip_rad, steady_rad },
         }
     }

@@ -31,10 +31,9 @@ pub(crate) mod thresholds {
     pub(crate) const SMALL_COST: f64 = 1.3;
     /// Share of the remaining weighted cost that a first and a later effect must close.
     pub(crate) const LEAST_SHARE: [f64; 2] = [0.05, 0.05];
-    /// How sure it must be that a candidate beats the current model, in standard deviations over blocks.
-    pub(crate) const LEAST_Z: f64 = 2.0;
-    /// The same for an effect that sits in one part of the lap: other blocks do not hold it.
-    pub(crate) const LEAST_PLACE_Z: f64 = 1.0;
+    /// How sure it must be that a candidate beats the current model, in standard deviations over blocks: a short drive has few, and the first of
+    /// two effects does worse without the other on some.
+    pub(crate) const LEAST_Z: f64 = 1.0;
     /// Largest effect that is believed, over the size that matters: what needs more stands in for something else.
     pub(crate) const MOST_SIZE: f64 = 4.5;
     /// Smallest effect that is named, over the size that matters.
@@ -56,12 +55,12 @@ pub(crate) mod thresholds {
 /// One round of the search.
 #[derive(Debug, Clone)]
 pub(crate) struct Round {
-    /// Refitted candidates, best first.
+    /// Refitted candidates, best first; ahead of them the best of those that may be taken.
     pub(crate) refits: Vec<Refit>,
     /// Chance that the best beats each of the others, in standard deviations.
     pub(crate) lead_z: Vec<f64>,
     pub(crate) screening: Screening,
-    /// Whether the best is good enough to be taken.
+    /// Whether the first is good enough to be taken.
     pub(crate) taken: bool,
     /// The model before it.
     pub(crate) before: State,
@@ -157,8 +156,9 @@ pub(crate) fn round(
     }
     let mut round =
         Round { refits, lead_z: Vec::new(), screening, taken: false, before, blocks: windows.block.clone() };
+    let before = &round.before;
+    round.taken = lead(&mut round.refits, |r| acceptable(engine, r, before, number));
     round.compare(windows);
-    round.taken = round.winner().is_some_and(|r| acceptable(engine, r, &round.before, number));
     round
 }
 
@@ -207,6 +207,12 @@ fn prefer_simple(refits: &mut [Refit]) {
     }
 }
 
+/// Puts the best of those that may be taken ahead of what is better, but too small or too large; whether there is one.
+fn lead<T>(best_first: &mut [T], may_be_taken: impl Fn(&T) -> bool) -> bool {
+    let place = best_first.iter().position(may_be_taken);
+    place.inspect(|&place| best_first[..=place].rotate_right(1)).is_some()
+}
+
 /// Whether a model is still needed beside a simpler one.
 pub(crate) fn needed(simpler: &State, state: &State) -> bool {
     let residuals = state.residuals;
@@ -224,10 +230,25 @@ fn acceptable(engine: &Engine<'_>, r: &Refit, before: &State, number: usize) -> 
     };
     let residuals = before.residuals;
     let remaining = (before.cost - thresholds::NOISE_COST * residuals).max(0.05 * before.cost);
-    let least_z = if r.effect.is_of_a_place() { thresholds::LEAST_PLACE_Z } else { thresholds::LEAST_Z };
-    r.z > least_z
+    r.z > thresholds::LEAST_Z
         && r.relative_size < thresholds::MOST_SIZE
         && r.gain > thresholds::LEAST_GAIN * residuals
         && r.gain > thresholds::LEAST_SHARE[number.min(1)] * remaining
         && r.relative_size > least_size
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_best_that_may_be_taken_leads_and_the_others_keep_their_order() {
+        let mut gains = [9, 7, 5, 3];
+        assert!(lead(&mut gains, |gain| *gain < 6));
+        assert_eq!(gains, [5, 9, 7, 3]);
+        assert!(lead(&mut gains, |_| true));
+        assert_eq!(gains, [5, 9, 7, 3]);
+        assert!(!lead(&mut gains, |gain| *gain > 9));
+        assert_eq!(gains, [5, 9, 7, 3]);
+    }
 }

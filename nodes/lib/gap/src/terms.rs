@@ -87,6 +87,18 @@ pub struct Axle<T> {
     pub usable: T,
 }
 
+/// How much less a tire carries, per load, for every share of load that comes on top of the one at rest.
+const LOAD_SENSITIVITY: f64 = 0.1;
+
+impl<T: Real> Axle<T> {
+    /// The load as the tire makes use of it: a tire's force grows less than its load does (Pacejka, Tire and Vehicle Dynamics, section 4.3.1,
+    /// `p_Dy2`).
+    pub(crate) fn carried_n(&self, at_rest_n: T) -> T {
+        let more = self.load_n / at_rest_n - 1.0;
+        self.load_n * (-(more * LOAD_SENSITIVITY) + 1.0)
+    }
+}
+
 /// Both axles at an instant.
 #[derive(Debug, Clone, Copy)]
 pub struct Axles<T> {
@@ -218,4 +230,17 @@ pub(crate) fn delayed<T: Real>(series: &[T], delay_s: T, dt_s: f64) -> Vec<T> {
             series[left] + (series[left + 1] - series[left]) * (place - left as f64)
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tire_makes_less_of_more_load() {
+        let carried = |load_n: f64| Axle { load_n, steer_rad: 0.0, grip: 1.0, usable: 1.0 }.carried_n(1000.0);
+        approx::assert_relative_eq!(carried(1000.0), 1000.0);
+        approx::assert_relative_eq!(carried(1100.0), 1100.0 * 0.99);
+        approx::assert_relative_eq!(carried(800.0), 800.0 * 1.02);
+    }
 }

@@ -14,7 +14,7 @@ use crate::windows::Windows;
 /// A change of a size by this share and more says no more.
 const MOST: f64 = 1.0;
 /// What a size is taken to change by where there are no other data.
-const UNTRIED: f64 = 0.2;
+pub(crate) const UNTRIED: f64 = 0.2;
 /// A relative size known to no better than this is not known.
 const UNKNOWN: f64 = 100.0;
 /// Ridge that keeps a problem that data do not show solvable.

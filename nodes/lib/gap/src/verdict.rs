@@ -10,6 +10,7 @@ use crate::rooms::Left;
 use crate::select::{Round, thresholds};
 use crate::sizes::{is_told, sizes};
 use crate::state::State;
+use crate::transfer::UNTRIED;
 
 // Fixed on development cases, 2026-11-21: see tests/results/gap.
 
@@ -41,6 +42,8 @@ pub(crate) struct Claim {
     untried: Vec<EffectId>,
     /// What speaks against naming it.
     doubts: Vec<String>,
+    /// How far its size drifts between data.
+    drift: f64,
     /// Whether it is sure enough, and its size told well enough, to be named.
     pub(crate) named: bool,
 }
@@ -72,19 +75,20 @@ pub(crate) fn claims(
         let found = round.refits.iter().find(|r| r.effect == effect);
         let untried: Vec<EffectId> =
             effect.spec().alike.iter().filter(|e| !library.contains(e)).copied().collect();
+        let drift = remains.drifts.get(number).copied().unwrap_or(f64::INFINITY);
         let signs = Signs {
             left: remains.after.most(),
             left_in_its_room: remains.after.of(effect.room()),
             explained: remains.explained.get(number).copied().unwrap_or_default(),
-            drift: remains.drifts.get(number).copied().unwrap_or(f64::INFINITY),
+            drift,
             relative_size: found.map_or(f64::INFINITY, |r| r.relative_size),
             confused: confused.len(),
             untried: untried.len(),
         };
-        let named = signs.chance() >= LEAST_CHANCE && is_told(state, effect, &engine.absent(effect), blocks);
+        let named = signs.chance() >= LEAST_CHANCE && is_told(engine, state, effect, drift, blocks);
         confused.extend(&untried);
         let doubts = if named { Vec::new() } else { signs.heavy_doubts() };
-        Claim { effect, confidence: signs.confidence(), confused, untried, doubts, named }
+        Claim { effect, confidence: signs.confidence(), confused, untried, doubts, drift, named }
     };
     state.named.iter().zip(evidence).enumerate().map(claim).collect()
 }
@@ -161,6 +165,7 @@ pub(crate) fn decide(
 /// The effects named, with their sizes in the `model` that holds no others, then the other candidates by what each would close beside them,
 /// with theirs in the search's last `state`.
 pub(crate) fn rank(
+    engine: &Engine<'_>,
     claims: &[Claim],
     [model, state]: [&State; 2],
     blocks: &[usize],
@@ -175,7 +180,13 @@ pub(crate) fn rank(
         out.push(RankedEffect {
             name: claim.effect.name(),
             accepted: claim.named,
-            parameters: sizes(if claim.named { model } else { state }, claim.effect, blocks),
+            parameters: sizes(
+                engine,
+                if claim.named { model } else { state },
+                claim.effect,
+                claim.drift,
+                blocks,
+            ),
             gap_closed_fraction: if claim.named {
                 budget.closed_by_step(step)
             } else {
@@ -190,7 +201,7 @@ pub(crate) fn rank(
         out.push(RankedEffect {
             name: r.effect.name(),
             accepted: false,
-            parameters: sizes(&r.state, r.effect, &last.blocks),
+            parameters: sizes(engine, &r.state, r.effect, UNTRIED, &last.blocks),
             gap_closed_fraction: budget.closed_by_candidate(r.effect),
             confidence: 0.0,
             confused_with: Vec::new(),
@@ -240,7 +251,7 @@ fn confused(round: &Round, effect: EffectId) -> Vec<EffectId> {
         .refits
         .iter()
         .zip(&round.lead_z)
-        .filter(|(r, _)| r.effect != effect)
+        .filter(|(r, _)| r.effect != effect && r.relative_size < thresholds::MOST_SIZE)
         .filter(|(r, z)| {
             let near = best.gain - r.gain < thresholds::NEAR_SHARE * best.gain;
             let alike = round.screening.cosine(effect, r.effect) > thresholds::CONFUSED_COSINE;

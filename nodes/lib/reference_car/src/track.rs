@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 use crate::error::ReferenceCarError;
 
 /// Names of the closed tracks.
-pub const TRACK_NAMES: [&str; 13] = [
+pub const TRACK_NAMES: [&str; 15] = [
     "oval", "club", "esses", "bean", "clover", "harbor", "valley", "quarry", "delta", "lagoon", "ridge",
-    "basin", "summit",
+    "basin", "summit", "meadow", "canyon",
 ];
 
 /// A closed centre line, sampled evenly by arc length.
@@ -67,6 +67,10 @@ fn shape(name: &str) -> Option<Shape> {
         "ridge" => Shape { size_m: 220.0, cosines: &[(2, 0.24), (5, 0.04)], sines: &[(1, 0.12), (3, -0.11)] },
         "basin" => Shape { size_m: 195.0, cosines: &[(2, 0.16), (3, -0.13)], sines: &[(1, 0.1), (4, 0.07)] },
         "summit" => Shape { size_m: 230.0, cosines: &[(1, 0.22), (4, -0.05)], sines: &[(2, 0.1), (3, 0.14)] },
+        "meadow" => Shape { size_m: 205.0, cosines: &[(1, 0.1), (2, 0.21)], sines: &[(3, -0.12), (4, 0.05)] },
+        "canyon" => {
+            Shape { size_m: 220.0, cosines: &[(2, -0.14), (3, 0.1), (5, 0.03)], sines: &[(1, 0.2), (2, 0.1)] }
+        }
         _ => return None,
     };
     Some(shape)

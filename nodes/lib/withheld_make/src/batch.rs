@@ -273,6 +273,9 @@ fn stand_ins(
     names.into_iter().map(|name| draw::typical(name, scenario)).collect()
 }
 
+/// A lap that ends where it began climbs as much as it falls: the sign of its slope says where, and the library states the steepest climb.
+const CLIMB: &str = "road_slope";
+
 /// An effect with its size in the library's terms.
 fn sealed(setting: EffectSetting, oracle: Option<OracleFit>) -> Result<SealedEffect, WithheldError> {
     let spec = effect_spec(&setting.name)?;
@@ -284,7 +287,8 @@ fn sealed(setting: EffectSetting, oracle: Option<OracleFit>) -> Result<SealedEff
         .map(|(name, value)| {
             let null = spec.parameters.iter().find(|p| p.name == name).and_then(|p| p.null);
             let scaled = null.map_or(*value, |null| null + ratio * (value - null));
-            (name.clone(), if sizing.contains(&name.as_str()) { scaled } else { *value })
+            let size = if setting.name == CLIMB { scaled.abs() } else { scaled };
+            (name.clone(), if sizing.contains(&name.as_str()) { size } else { *value })
         })
         .collect();
     Ok(SealedEffect { name: setting.name, parameters: setting.parameters, library_parameters, oracle })
@@ -292,4 +296,32 @@ fn sealed(setting: EffectSetting, oracle: Option<OracleFit>) -> Result<SealedEff
 
 fn text(path: &Path, content: &str) -> Result<(), WithheldError> {
     fs::write(path, content).map_err(WithheldError::io(path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slope_is_sealed_by_its_climb_and_other_sizes_by_their_sign() {
+        let in_the_library = |name: &str, value: f64| {
+            let fit =
+                OracleFit { severity: 3.0, size_ratio: 1.1, chi2_per_residual: 1.0, excess_without: None };
+            let effect = sealed(EffectSetting::new(name, &[value]).unwrap(), Some(fit)).unwrap();
+            let [constant, size] =
+                [effect.parameters, effect.library_parameters].map(|p| p.into_values().next());
+            assert_eq!(constant, Some(value));
+            size.unwrap()
+        };
+        // Of a ratio what it is off by counts.
+        let expected = [
+            ("road_slope", -0.03, 0.033),
+            ("road_slope", 0.03, 0.033),
+            ("road_bank", -0.03, -0.033),
+            ("mass_error", 1.1, 1.11),
+        ];
+        for (name, constant, size) in expected {
+            assert!((in_the_library(name, constant) - size).abs() < 1e-12, "{name}");
+        }
+    }
 }

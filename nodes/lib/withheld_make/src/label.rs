@@ -68,7 +68,7 @@ pub struct SealedEffect {
     pub name: String,
     /// The mechanism's constants.
     pub parameters: BTreeMap<String, f64>,
-    /// The same in the library's terms: the constants, the sizing ones times [`OracleFit::size_ratio`].
+    /// The same in the library's terms: the constants, the sizing ones times [`OracleFit::size_ratio`]; of a slope the steepest climb.
     pub library_parameters: BTreeMap<String, f64>,
     /// The generator's own fit; none for recorded and foreign drives.
     pub oracle: Option<OracleFit>,
