@@ -239,7 +239,7 @@ impl Rollout for ExtendedModel<'_> {
 mod tests {
     use super::*;
     use gripsight_signals::StateSequence;
-    use gripsight_vehicle::{Input, SingleTrack, State};
+    use gripsight_vehicle::{GRAVITY_MPS2, Input, SingleTrack, State};
 
     fn recording(seconds: usize) -> Recording {
         let n = 100 * seconds;
@@ -345,10 +345,14 @@ mod tests {
         let more = |effect, own: &[f64]| a_x_mps2(&[effect], own, 0.0) - plain;
         approx::assert_relative_eq!(a_x_mps2(&[], &[], 1.0) - plain, 1.0, epsilon = 1e-9);
         let resistance = more(EffectId::RollingResistance, &[0.03]);
-        approx::assert_relative_eq!(resistance, -0.03 * 9.81 / TURNED, epsilon = 1e-9);
+        approx::assert_relative_eq!(resistance, -0.03 * GRAVITY_MPS2 / TURNED, epsilon = 1e-9);
         // An accelerometer on a slope feels what holds the wheels back.
         let slope = more(EffectId::RoadSlope, &[0.05, 0.0, 0.0]);
-        approx::assert_relative_eq!(slope, 9.81 * 0.05_f64.sin() * (1.0 - 1.0 / TURNED), epsilon = 1e-9);
+        approx::assert_relative_eq!(
+            slope,
+            GRAVITY_MPS2 * 0.05_f64.sin() * (1.0 - 1.0 / TURNED),
+            epsilon = 1e-9
+        );
         // A mass that the file does not know makes the same command do less; the wheels are as they were.
         let mass =
             a_x_mps2(&[EffectId::MassError], &[1.1], 1.0) - a_x_mps2(&[EffectId::MassError], &[1.1], 0.0);
