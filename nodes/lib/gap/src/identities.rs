@@ -37,6 +37,8 @@ pub struct Identity {
 const SMOOTH_S: f64 = 0.15;
 /// Noise of two measurements has nothing in common; where the fastest changes of two sides do, one was made of the other.
 const DERIVED_CORRELATION: f64 = 0.35;
+/// What remains between two sides of which one was made of the other, over the noise that both share: less than this.
+const DERIVED_REMAINDER: f64 = 0.5;
 /// No accelerometer on a driving car is this quiet.
 const QUIET_MPS2: f64 = 0.02;
 
@@ -89,6 +91,7 @@ fn half(s: &Segment) -> usize {
 fn test(name: &'static str, segments: &[Segment], sides: &dyn Fn(&Segment) -> Option<Sides>) -> Identity {
     let mut pairs: Vec<(f64, f64)> = Vec::new();
     let mut rough: Vec<f64> = Vec::new();
+    let mut damped: Vec<f64> = Vec::new();
     let mut fast: Vec<(f64, f64)> = Vec::new();
     for s in segments {
         let half = half(s);
@@ -99,9 +102,11 @@ fn test(name: &'static str, segments: &[Segment], sides: &dyn Fn(&Segment) -> Op
         // A smoothing derivative damps fast changes. Taken of the integral of either side it damps both alike, and the scale is not biased.
         let slope = |integral: &[f64]| local_quadratic(integral, half, s.dt_s).1;
         let (slow_left, slow_right) = (slope(&integral(&left, s.dt_s)), slope(&right_integral));
+        let smooth_left = local_quadratic(&left, half, s.dt_s).0;
         for k in half..s.len() - half {
             pairs.push((slow_left[k], slow_right[k]));
-            rough.push((left[k] - slow_left[k]).abs());
+            rough.push((left[k] - smooth_left[k]).abs());
+            damped.push((smooth_left[k] - slow_left[k]).abs());
             let second = |x: &[f64]| x[k + 1] - 2.0 * x[k] + x[k - 1];
             fast.push((second(&left), second(&direct)));
         }
@@ -127,7 +132,9 @@ fn test(name: &'static str, segments: &[Segment], sides: &dyn Fn(&Segment) -> Op
     let noise = (median(rough) / 0.674_5).max(1e-9);
     let quiet = crate::noise::of(segments.iter().map(|s| s.a_y_mps2.as_slice()), 4) < QUIET_MPS2;
     let alike = correlation(&fast) > DERIVED_CORRELATION || (name == LATERAL && quiet);
-    let derived = alike && left_over < noise;
+    // Of signals without noise to speak of nobody can tell: their fastest changes are the car's.
+    let told = noise > median(damped) / 0.674_5;
+    let derived = alike && told && left_over < DERIVED_REMAINDER * noise;
     let finding = if derived {
         "one side was derived from the other: says nothing".to_owned()
     } else {
