@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use gripsight_bag::Reassembler;
 use gripsight_gap::{Diagnosis, GapError, Request, diagnose};
+use gripsight_identification::export::stamp_text;
 use gripsight_identification::vehicle_hash;
 use gripsight_msgs::{
     GapReport, MagicFormula as FormulaMessage, PacejkaParams, StateSequence as SequenceMessage,
@@ -176,7 +177,7 @@ impl Diagnoser<'_> {
             let header = Header {
                 car: self.vehicle.name.clone().unwrap_or_else(|| "car".to_owned()),
                 bag: format!("live, sequence {}", sequence.sequence_id),
-                data_stamp: format!("{:.3} s", sequence.start_stamp_ns as f64 / gripsight_signals::NS_PER_S),
+                data_stamp: stamp_text(sequence.start_stamp_ns),
                 tool_version: env!("CARGO_PKG_VERSION").to_owned(),
                 vehicle_hash: hash.clone(),
                 seed: None,

@@ -8,7 +8,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use gripsight_bag::{Bag, BagWriter, ReadReport, TopicMap, encode, read_sequences};
 use gripsight_gap::{Diagnosis, EffectId, ExtendedModelFile, Prediction, Request, Verdict, diagnose};
-use gripsight_identification::export::read_tires;
+use gripsight_identification::export::{read_tires, stamp_text};
 use gripsight_identification::vehicle_hash;
 use gripsight_report::{GapInput, Header, gap_page};
 use gripsight_signals::{OdometrySample, StateSequence, WindowConfig};
@@ -109,7 +109,13 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     let diagnosing_s = start.elapsed().as_secs_f64() - reading_s;
     fs::create_dir_all(&args.out).with_context(|| format!("cannot make {}", args.out.display()))?;
     let header = header(subject, &vehicle, &sequence);
-    let page = gap_page(&GapInput { diagnosis: &result, header: &header, data_notes: &data_notes(&report) })?;
+    let earlier = args.bag2.as_ref().map(|_| file_name(&args.bag));
+    let page = gap_page(&GapInput {
+        diagnosis: &result,
+        header: &header,
+        earlier: earlier.as_deref(),
+        data_notes: &data_notes(&report),
+    })?;
     let timing = Timing { reading_s, diagnosing_s, total_s: start.elapsed().as_secs_f64() };
     let mut files = vec![
         ("gap.json", serde_json::to_string_pretty(&result)? + "\n"),
@@ -126,6 +132,9 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     if let Some(path) = &args.predictions {
         write_predictions(subject, path, sequence.start_stamp_ns, &result.series.predictions)
             .with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    if let Some(earlier) = earlier {
+        println!("compared   {} with {earlier}: what has changed since", file_name(subject));
     }
     print!("{}", result.text());
     let names: Vec<&str> = files.iter().map(|f| f.0).collect();
@@ -207,12 +216,16 @@ pub(crate) fn read(path: &Path, topics: &TopicMap) -> anyhow::Result<(StateSeque
     }
 }
 
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
 fn header(bag: &Path, vehicle: &VehicleParameters, sequence: &StateSequence) -> Header {
     let stem = || bag.file_stem().map(|s| s.to_string_lossy().into_owned());
     Header {
         car: vehicle.name.clone().or_else(stem).unwrap_or_else(|| "car".into()),
-        bag: bag.file_name().unwrap_or(bag.as_os_str()).to_string_lossy().into_owned(),
-        data_stamp: format!("{:.3} s since 1970", sequence.start_stamp_ns as f64 * 1e-9),
+        bag: file_name(bag),
+        data_stamp: stamp_text(sequence.start_stamp_ns),
         tool_version: env!("CARGO_PKG_VERSION").to_owned(),
         vehicle_hash: vehicle_hash(vehicle),
         seed: None,

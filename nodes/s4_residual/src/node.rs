@@ -46,13 +46,15 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
     let default = Config::default();
     let epochs = node.parameter(
         "epochs",
-        default.epochs as i64,
-        Descriptor::new("Epochs of training at most, each turn").range(1.0..=1000.0).read_only(),
+        0,
+        Descriptor::new("Epochs of training at most, each turn; 0: 60, with method paper 10")
+            .range(0.0..=1000.0)
+            .read_only(),
     )?;
     let config = Config {
         method: if method.get() == "paper" { Method::Paper } else { Method::Robust },
         residual: ResidualKind::from_name(&residual.get()).unwrap_or_default(),
-        epochs: epochs.get() as usize,
+        epochs: usize::try_from(epochs.get()).ok().filter(|&n| n > 0),
         ..default
     };
     let mut sequences = node.subscription::<SequenceMessage>("sequence", Qos::latched().with_depth(64))?;

@@ -9,6 +9,10 @@ from pathlib import Path
 HERE = Path(__file__).parent
 # Medians within this share of the best are a tie.
 TIE = 0.05
+# A stiffness further off than this is wrong.
+WRONG = 0.25
+# What the reference car's tires give at no slip and static load, over that load, front and rear (nodes/lib/reference_car/src/cars.rs).
+TIRES = {"f1tenth": (8.6, 10.2), "formula_student": (15.5, 17.5), "race_car": (18.0, 21.0), "passenger_car": (13.5, 17.0)}
 
 
 def rows(name):
@@ -116,8 +120,35 @@ def draws(out):
     accepted = [r for r in used if int(r["accepted"])]
     apart = [max(abs(number(r, k) / number(r, k + "_true") - 1) for k in ("kf", "kr")) for r in accepted]
     out.append(f"- largest error of an accepted stiffness: {100 * max(apart):.0f} %; 95th percentile {100 * sorted(apart)[len(apart) * 95 // 100]:.0f} %")
-    wrong = sum(max(abs(number(r, k) / number(r, k + "_true") - 1) for k in ("kf", "kr")) > 0.25 for r in accepted)
-    out.append(f"- accepted: {len(accepted)} of {len(used)}; with a stiffness off by more than 25 %: {wrong}")
+    out.append(f"- accepted: {len(accepted)} of {len(used)}; with a stiffness off by more than 25 %: {sum(bool(wrong(r)) for r in accepted)}")
+
+
+def off(row, axle, truth):
+    """Error of a stiffness, as a share: of the floor's, or of the tires' own."""
+    true = number(row, f"k{axle}_true") if truth == "floor" else TIRES[row["run"].split()[0]]["fr".index(axle)]
+    return number(row, "k" + axle) / true - 1
+
+
+def wrong(row, *truths):
+    return [a for a in "fr" if all(abs(off(row, a, truth)) > WRONG for truth in truths or ("floor",))]
+
+
+def two_truths(out):
+    """The floor's B C D against the tires' own stiffness."""
+    sets = (("9000-9599", rows("accuracy_draws.csv")), ("9750-9826, 9875-9951", rows("accuracy_draws_fresh.csv")))
+    out.append("\n| draws | accepted | off by more than 25 % from the floor's | from the tires' own | from both |")
+    out.append("| --- | --- | --- | --- | --- |")
+    for name, every in sets:
+        accepted = [r for r in every if not refused(r) and int(r["accepted"])]
+        count = lambda *truths: sum(bool(wrong(r, *truths)) for r in accepted)
+        out.append(f"| {name} ({len(every)}) | {len(accepted)} | {count('floor')} | {count('tires')} | {count('floor', 'tires')} |")
+    out.append("\n| accepted and wrong by the floor | axle | found, over load | the floor's | the tires' own |")
+    out.append("| --- | --- | --- | --- | --- |")
+    for _, every in sets:
+        for r in every:
+            for a in wrong(r) if not refused(r) and int(r["accepted"]) else ():
+                own = TIRES[r["run"].split()[0]]["fr".index(a)]
+                out.append(f"| {r['run']} | {'front' if a == 'f' else 'rear'} | {number(r, 'k' + a):.1f} | {number(r, f'k{a}_true'):.1f} | {own} |")
 
 
 def priors(out):
@@ -131,7 +162,7 @@ def priors(out):
         worst = lambda r, of, truth: max(abs(number(r, of + a) / number(r, f"{of}{a}_{truth}") - 1) for a in "fr")
         out.append(
             f"| {text} | {sigma} | {len(used)} | {len(accepted)} | {held} | "
-            f"{sum(worst(r, 'd', 'floor') > 0.25 for r in accepted)} | {sum(worst(r, 'k', 'true') > 0.25 for r in accepted)} | "
+            f"{sum(worst(r, 'd', 'floor') > WRONG for r in accepted)} | {sum(bool(wrong(r)) for r in accepted)} | "
             f"{against} |"
         )
 
@@ -238,6 +269,7 @@ def main():
         [
             ("Plants", plants),
             ("Intervals and claims of a peak", draws),
+            ("The floor's stiffness and the tires' own", two_truths),
             ("Draws with a friction prior", priors),
             ("Robustness", robustness),
         ],

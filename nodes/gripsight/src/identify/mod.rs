@@ -66,9 +66,9 @@ pub(crate) struct IdentifyArgs {
     /// Which network learns what the model leaves over.
     #[arg(long, value_enum, default_value_t = ResidualName::S4)]
     residual: ResidualName,
-    /// Epochs of training at most, each turn of the outer loop; fewer leave more for the next turn.
-    #[arg(long, value_name = "N", default_value_t = Config::default().epochs)]
-    epochs: usize,
+    /// Epochs of training at most, each turn of the outer loop; fewer leave more for the next turn [default: 60, with --method paper 10].
+    #[arg(long, value_name = "N")]
+    epochs: Option<usize>,
     /// Seed of everything random.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,

@@ -54,7 +54,7 @@ impl Progress {
 
     /// The stages of one run.
     pub(super) fn run(&self, config: &Config) -> Stages<'_> {
-        self.bar.set_length(config.epochs as u64);
+        self.bar.set_length(config.epochs_at_most() as u64);
         Stages { bar: &self.bar, since: Instant::now(), stage: Stage::Preparing, timing: Timing::default() }
     }
 }

@@ -147,6 +147,9 @@ pub(crate) fn by_role<T: Serialize, S: serde::Serializer>(
     serializer.collect_map(Role::ALL.into_iter().map(Role::name).zip(values))
 }
 
+/// What gripsight wrote into a bag itself (`diagnose --predictions`): never taken for a recording unless it is asked for by name.
+const OWN_PREFIX: &str = "/gripsight/";
+
 fn find(
     bag: &Bag,
     wanted: Option<&str>,
@@ -165,7 +168,8 @@ fn find(
         Some("") if !needed => return Ok(None),
         Some(name) => bag.topics().iter().find(|t| t.name == name).ok_or_else(|| missing(name))?,
         None => {
-            let mut of_type = bag.topics().iter().filter(|t| t.type_name == type_name);
+            let recorded = |t: &&Topic| t.type_name == type_name && !t.name.starts_with(OWN_PREFIX);
+            let mut of_type = bag.topics().iter().filter(recorded);
             match (of_type.next(), of_type.next()) {
                 (Some(only), None) => only,
                 (None, _) if needed => return Err(missing(&format!("type {type_name}"))),

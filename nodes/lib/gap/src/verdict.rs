@@ -266,11 +266,14 @@ fn confused(round: &Round, effect: EffectId) -> Vec<EffectId> {
 pub(crate) fn drive_next(effects: &[RankedEffect]) -> Vec<String> {
     let mut out = Vec::new();
     for e in effects.iter().filter(|e| e.accepted && !e.confused_with.is_empty()) {
-        let manoeuvres: Vec<String> = std::iter::once(e.name)
+        let mut manoeuvres: Vec<&str> = std::iter::once(e.name)
             .chain(e.confused_with.iter().copied())
             .filter_map(EffectId::by_name)
-            .map(|id| format!("{} ({})", id.spec().excitation, id.name()))
+            .map(|id| id.spec().excitation)
             .collect();
+        // Some of a group ask for the same driving, not always next to each other.
+        manoeuvres.sort_unstable();
+        manoeuvres.dedup();
         out.push(format!(
             "to tell {} from {}: {}",
             e.name,

@@ -107,11 +107,11 @@ impl Data {
             a_x_mps2,
             noise,
         };
-        data.share_out(&windows);
+        data.share_out(&windows, usize::MAX);
         Ok(data)
     }
 
-    /// Leaves out what lies before a time, but for the shortest drive that can be fitted.
+    /// Leaves out what lies before a time, but for the shortest drive that can be fitted. The rest is shared out so that every part gets some.
     pub(crate) fn leave_out_before(&mut self, time_s: f64) {
         let begin_s = |w: &Window| {
             let segment = &self.segments[w.segment];
@@ -119,14 +119,15 @@ impl Data {
         };
         let after = self.windows.iter().filter(|(w, _)| begin_s(w) >= time_s - 1e-6).count().max(MIN_WINDOWS);
         let windows: Vec<Window> = self.windows.iter().map(|(w, _)| *w).collect();
-        self.share_out(&windows[windows.len().saturating_sub(after)..]);
+        let windows = &windows[windows.len().saturating_sub(after)..];
+        self.share_out(windows, windows.len() / PATTERN.len());
     }
 
-    /// Gives the windows their parts. Every part gets some, however short the drive.
-    fn share_out(&mut self, windows: &[Window]) {
+    /// Gives the windows their parts, in blocks of at most so many.
+    fn share_out(&mut self, windows: &[Window], most_per_block: usize) {
         let len_s = windows.first().map_or(WINDOW_S, |w| w.len as f64 * self.dt_s);
         let per_block = (BLOCK_S / len_s).round() as usize;
-        let per_block = per_block.min(windows.len() / PATTERN.len()).max(1);
+        let per_block = per_block.min(most_per_block).max(1);
         let part = |i: usize| PATTERN[i / per_block % PATTERN.len()];
         self.windows = windows.iter().enumerate().map(|(i, w)| (*w, part(i))).collect();
         let speeds: Vec<f64> = self.samples(|s, k| s.v_x_mps[k]).collect();

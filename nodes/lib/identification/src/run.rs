@@ -18,7 +18,7 @@ use crate::extract::extract;
 use crate::judge::rollout_errors;
 use crate::residual::left_over;
 use crate::rollout::{TireRollout, vector_of};
-use crate::start::{check, initial_tires};
+use crate::start::{check, initial_tires, no_softer};
 use crate::sweep::{Point, Sweep, sweep};
 use crate::tires::curve_change;
 use crate::{
@@ -122,7 +122,7 @@ impl Identification {
     ) -> Result<Started, IdentificationError> {
         check(vehicle, prior, previous, config)?;
         let key = RunKey::first(sequence, vehicle, config);
-        let initial = initial_tires(prior, previous, config);
+        let mut initial = initial_tires(prior, previous, config.method, &config.initial);
         let health = DataHealth::of(sequence)?;
         let refuse = |reason: String, drive: &str| {
             let request = Request { key: &key, vehicle, prior, config, initial: &initial };
@@ -148,6 +148,10 @@ impl Identification {
         }
         let warm = previous.map(|p| (&p.phi_p, &p.corrections));
         let direct = direct(&data, vehicle, prior, warm)?;
+        if config.method == Method::Paper {
+            initial =
+                initial_tires(prior, previous, config.method, &no_softer(&config.initial, &direct.tires));
+        }
         let phi_p = match config.method {
             Method::Robust if config.direct_start => direct.tires,
             _ => initial,
@@ -317,7 +321,7 @@ pub fn identify(
         Started::Running(run) => run,
         Started::Refused(outcome) => return Ok(*outcome),
     };
-    let epochs_max = config.epochs;
+    let epochs_max = config.epochs_at_most();
     loop {
         let iteration = run.candidate.key.iteration + 1;
         progress(Stage::Training { iteration, epoch: 0, epochs_max, loss: f64::NAN });

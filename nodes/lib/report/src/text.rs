@@ -85,6 +85,16 @@ pub fn percent(share: f64) -> String {
     if share.is_finite() { format!("{} %", fixed(100.0 * share, 0)) } else { NOTHING.into() }
 }
 
+/// "low … high %" of two shares: whole percents, or tenths where the interval is narrower than two of them.
+#[must_use]
+pub fn percent_interval(low: f64, high: f64) -> String {
+    if !(low.is_finite() && high.is_finite()) {
+        return NOTHING.into();
+    }
+    let decimals = usize::from(high - low < 0.02);
+    format!("{} … {} %", fixed(100.0 * low, decimals), fixed(100.0 * high, decimals))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -108,5 +118,13 @@ mod tests {
         assert_eq!(with_interval(2.384_08, 2.383_8, 2.384_35).0, "2.384");
         assert_eq!(interval(-0.000_4, 0.3), "0.00 … 0.30");
         assert_eq!(interval(1.0, 1.0), "1.00 … 1.00");
+    }
+
+    #[test]
+    fn shares_are_whole_percents_or_tenths() {
+        assert_eq!(percent_interval(0.6, 0.8), "60 … 80 %");
+        assert_eq!(percent_interval(0.955_4, 0.961_8), "95.5 … 96.2 %");
+        assert_eq!(percent_interval(-0.000_009, 0.000_058), "0.0 … 0.0 %");
+        assert_eq!(percent_interval(f64::NAN, 0.5), "–");
     }
 }

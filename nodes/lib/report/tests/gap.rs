@@ -136,6 +136,10 @@ fn diagnosis() -> Diagnosis {
 }
 
 fn page(diagnosis: &Diagnosis) -> String {
+    page_since(diagnosis, None)
+}
+
+fn page_since(diagnosis: &Diagnosis, earlier: Option<&str>) -> String {
     let header = Header {
         car: "car".into(),
         bag: "laps.mcap".into(),
@@ -145,7 +149,7 @@ fn page(diagnosis: &Diagnosis) -> String {
         seed: None,
         command: "gripsight diagnose laps.mcap --out DIR".into(),
     };
-    gap_page(&GapInput { diagnosis, header: &header, data_notes: &[] }).unwrap()
+    gap_page(&GapInput { diagnosis, header: &header, earlier, data_notes: &[] }).unwrap()
 }
 
 #[test]
@@ -180,6 +184,21 @@ fn every_verdict_has_its_sentence() {
         d.verdict = verdict;
         let text = headline(&d);
         assert!(text.contains(words), "{text}");
+    }
+}
+
+#[test]
+fn a_comparison_speaks_of_what_has_changed() {
+    let mut d = diagnosis();
+    for (verdict, words) in [
+        (Verdict::Effects, "What has changed since monday.mcap is steering delay"),
+        (Verdict::TireRetuneOnly, "The tires have changed since monday.mcap"),
+        (Verdict::NoGap, "Nothing has changed since monday.mcap"),
+        (Verdict::NoneOfThese, "Something has changed since monday.mcap"),
+    ] {
+        d.verdict = verdict;
+        let html = page_since(&d, Some("monday.mcap"));
+        assert!(html.contains(words) && html.contains("Two drives compared"), "{words}");
     }
 }
 

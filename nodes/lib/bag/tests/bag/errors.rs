@@ -63,6 +63,18 @@ fn missing_topic() {
 }
 
 #[test]
+fn predictions_beside_a_recording_are_not_taken_for_it() {
+    let own = Channel { topic: "/gripsight/nominal/odom", ..Channel::odom() };
+    let bytes = ros2(&[own, Channel::odom(), Channel::drive()]);
+    // The one message of each topic is then too little to work on, which is the next thing to say.
+    let error = read(&bytes);
+    assert!(matches!(error, BagError::NothingAligned { .. }), "{error}");
+    let error =
+        read(&ros2(&[Channel { topic: "/gripsight/nominal/odom", ..Channel::odom() }, Channel::drive()]));
+    assert!(matches!(error, BagError::MissingTopic { role: "odom", .. }), "{error}");
+}
+
+#[test]
 fn several_topics_of_one_type() {
     let bytes = ros2(&[Channel::odom(), Channel { topic: "/ekf/odom", ..Channel::odom() }, Channel::drive()]);
     let error = read(&bytes);

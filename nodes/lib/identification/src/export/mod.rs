@@ -20,4 +20,4 @@ pub use error::ExportError;
 pub use files::TireFiles;
 pub use lookup::SteeringLookup;
 pub use read::read_tires;
-pub use tires::{Provenance, controller_txt, mpc_yaml};
+pub use tires::{Provenance, controller_txt, mpc_yaml, stamp_text};

@@ -26,6 +26,12 @@ pub struct Provenance {
     pub notes: Vec<String>,
 }
 
+/// A stamp in nanoseconds since 1970 as RFC 3339 in UTC, milliseconds.
+#[must_use]
+pub fn stamp_text(stamp_ns: i64) -> String {
+    DateTime::from_timestamp_nanos(stamp_ns).to_rfc3339_opts(SecondsFormat::Millis, true)
+}
+
 /// Starts the comment that says how old the data is: [`super::TireFiles`] dates the sets it keeps by it.
 pub(super) const STAMP_COMMENT: &str = "# data: ";
 
@@ -33,7 +39,7 @@ impl Provenance {
     /// The data's stamp as RFC 3339 in UTC, milliseconds.
     #[must_use]
     pub fn stamp(&self) -> String {
-        DateTime::from_timestamp_nanos(self.data_stamp_ns).to_rfc3339_opts(SecondsFormat::Millis, true)
+        stamp_text(self.data_stamp_ns)
     }
 
     fn comments(&self) -> String {

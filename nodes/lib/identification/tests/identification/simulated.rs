@@ -103,7 +103,7 @@ fn the_end_does_not_depend_on_the_start() {
 #[test]
 fn the_state_machine_is_the_whole_run_and_refuses_foreign_models() {
     let (_, sequence, vehicle) = drive(scenario("f1tenth", "club", 0.9, 0.9, 7).duration(15.0));
-    let config = Config { epochs: 5, seed: 3, ..Config::default() };
+    let config = Config { epochs: Some(5), seed: 3, ..Config::default() };
     let whole = identify(&sequence, &vehicle, None, None, &config, &mut |_| {}).unwrap();
     let Started::Running(mut run) = Identification::start(&sequence, &vehicle, None, None, &config).unwrap()
     else {
@@ -137,8 +137,13 @@ fn the_papers_method_runs_with_every_residual() {
     let (_, sequence, vehicle) = drive(scenario("f1tenth", "club", 0.9, 0.9, 8).duration(15.0));
     let prior = Some(FrictionPrior { mu: 0.8, sigma: 0.1 });
     for residual in [ResidualKind::S4, ResidualKind::Mlp, ResidualKind::Rnn, ResidualKind::None] {
-        let config =
-            Config { method: Method::Paper, residual, epochs: 5, max_iterations: 2, ..Config::default() };
+        let config = Config {
+            method: Method::Paper,
+            residual,
+            epochs: Some(5),
+            max_iterations: 2,
+            ..Config::default()
+        };
         let outcome = identify(&sequence, &vehicle, prior, None, &config, &mut |_| {}).unwrap();
         assert!(outcome.phi_p.is_finite() && outcome.iterations >= 1, "{residual:?}");
     }

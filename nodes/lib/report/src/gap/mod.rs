@@ -7,7 +7,7 @@ use gripsight_gap::{Diagnosis, Verdict};
 use maud::html;
 
 use crate::page::{Tone, facts_table, figure, list, page, section};
-use crate::text::{interval, percent};
+use crate::text::{percent, percent_interval};
 use crate::{Header, ReportError};
 
 /// What the page of a diagnosis shows.
@@ -17,6 +17,8 @@ pub struct GapInput<'a> {
     pub diagnosis: &'a Diagnosis,
     /// The head of the page.
     pub header: &'a Header,
+    /// The earlier drive's name where two drives are compared: its tires are the model's.
+    pub earlier: Option<&'a str>,
     /// What reading the data met, a sentence each.
     pub data_notes: &'a [String],
 }
@@ -58,7 +60,8 @@ pub fn gap_page(input: &GapInput<'_>) -> Result<String, ReportError> {
         Verdict::Effects | Verdict::TireRetuneOnly | Verdict::NoGap => Tone::Good,
         Verdict::NoneOfThese | Verdict::NotIdentifiable => Tone::Caution,
     };
-    Ok(page("Sim-to-real gap", tone, &verdict(d), input.header, &body))
+    let title = if input.earlier.is_some() { "Two drives compared" } else { "Sim-to-real gap" };
+    Ok(page(title, tone, &verdict(d, input.earlier), input.header, &body))
 }
 
 /// Whether the models beside the nominal one hold an effect.
@@ -66,24 +69,39 @@ fn names_effects(d: &Diagnosis) -> bool {
     d.effects.iter().any(|e| e.accepted)
 }
 
-/// The first line.
-fn verdict(d: &Diagnosis) -> String {
+/// The first line: of a car against its model, or of a car against its own earlier drive.
+fn verdict(d: &Diagnosis, earlier: Option<&str>) -> String {
     match d.verdict {
         Verdict::Effects => {
             let named: Vec<String> = d.effects.iter().filter(|e| e.accepted).map(tables::named).collect();
+            let what = match earlier {
+                Some(earlier) => format!("What has changed since {earlier} is"),
+                None => "The gap is".to_owned(),
+            };
             let closed = &d.gap_closed_fraction;
             format!(
-                "The gap is {}: {} of what other tires leave closes ({} %).",
+                "{what} {}: {} of what other tires leave closes ({}).",
                 named.join(" and "),
                 percent(closed.value),
-                interval(100.0 * closed.low, 100.0 * closed.high)
+                percent_interval(closed.low, closed.high)
             )
         }
-        Verdict::TireRetuneOnly => "Other tires close the gap; no other effect is needed.".into(),
-        Verdict::NoGap => {
-            "No gap: model and car agree within the noise and the model's usual imperfection.".into()
-        }
-        Verdict::NoneOfThese => "There is a gap that no effect of the library explains.".into(),
+        Verdict::TireRetuneOnly => match earlier {
+            Some(earlier) => format!("The tires have changed since {earlier}; no other effect is needed."),
+            None => "Other tires close the gap; no other effect is needed.".into(),
+        },
+        Verdict::NoGap => match earlier {
+            Some(earlier) => format!(
+                "Nothing has changed since {earlier} but for noise and the model's usual imperfection."
+            ),
+            None => "No gap: model and car agree within the noise and the model's usual imperfection.".into(),
+        },
+        Verdict::NoneOfThese => match earlier {
+            Some(earlier) => {
+                format!("Something has changed since {earlier} that no effect of the library explains.")
+            }
+            None => "There is a gap that no effect of the library explains.".into(),
+        },
         Verdict::NotIdentifiable => match d.reasons.first() {
             Some(reason) => format!("These data cannot tell: {reason}."),
             None => "These data cannot tell.".into(),

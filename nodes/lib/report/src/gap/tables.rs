@@ -7,7 +7,7 @@ use crate::Role;
 use crate::bars::{Bar, bars, logarithmic};
 use crate::health::health;
 use crate::page::{facts_table, list};
-use crate::text::{interval, percent, significant, with_interval};
+use crate::text::{interval, percent, percent_interval, significant, with_interval};
 
 /// Effects in the table.
 const SHOWN: usize = 6;
@@ -118,7 +118,7 @@ pub(super) fn tires(d: &Diagnosis) -> Markup {
 
 fn closes(fraction: &Estimate) -> String {
     if fraction.low < fraction.high {
-        format!("{} ({} %)", percent(fraction.value), interval(100.0 * fraction.low, 100.0 * fraction.high))
+        format!("{} ({})", percent(fraction.value), percent_interval(fraction.low, fraction.high))
     } else {
         percent(fraction.value)
     }

@@ -81,7 +81,7 @@ fn tire_curve(
     .with(Layer::Density { name: "samples".into(), bins })
     .with(Layer::Band { role: Role::Identified, name: "90 %".into(), points: band });
     if let Some(prior) = outcome.prior {
-        let name = if peak.from_prior { "prior (D stays at it)" } else { "prior" };
+        let name = if peak.from_prior { "prior (a soft bound on D)" } else { "prior" };
         chart = chart.with(Layer::Level { role: Role::Prior, name: name.into(), y: prior.mu });
     }
     chart = chart
