@@ -7,8 +7,8 @@
 //!    [`TireTrust`], and what every car does a little of (load transfers, relaxation, combined slip, an uncertain yaw inertia), each within
 //!    what is usual for the car. Without that background every car shows a gap, and stand-ins are named for it.
 //! 3. One Jacobian of all candidates ranks the effects of the library ([`EffectId`]); the best are refitted jointly with the null's
-//!    parameters from several starts; the null is refitted from the winner. A winner is taken if it is certain, believable in size and
-//!    closes enough of what remains; then the search goes on from there. An effect that a later one explains is dropped, and each
+//!    parameters from several starts; the null is refitted from the winner. The best that is certain, believable in size and
+//!    closes enough of what remains is taken; then the search goes on from there. An effect that a later one explains is dropped, and each
 //!    that is left is put up against all others once more, with the rest of the model in place ([`Look`]).
 //! 4. What the retuned tires and the effects leave is looked at room by room ([`Unexplained`]): steering, sensors, lateral and longitudinal
 //!    forces, road and wind each have free terms (impulse responses, curves, places) that can do roughly what any cause there does. An effect
@@ -21,8 +21,13 @@
 //!    ceiling), with the residual network of `gripsight_s4` in place of effects, against the noise. Effects that reach too little of the ceiling
 //!    are not named.
 //!
-//! Intervals of sizes use blocks of 4 s as clusters and add a share of the size for errors of the model that all blocks share; that
-//! share, and all thresholds (`select::thresholds`, `confidence`), were fixed on development drives of the reference car.
+//! Intervals of sizes use blocks of 4 s as clusters and add the size's drift, and shares of the size and of a size that matters for errors of
+//! the model that all blocks share; those shares, and all thresholds (`select::thresholds`, `confidence`), were fixed on development drives
+//! of the reference car.
+//!
+//! Two things a single-track model leaves out go with the effects, at constants any car roughly has: what pushes along the road turns the
+//! wheels, too, and a tire carries less per load the more it is loaded. Both are nothing where the command alone pushes and the loads
+//! are those at rest.
 //!
 //! # Adding an effect
 //!
