@@ -24,8 +24,11 @@ BASIS, SIGMAS = read_basis()
 
 
 def build(backbone):
-    """A torchvision network with five classes. BatchNorm's momentum is 0.1: torchvision's 0.01 is too slow for short runs."""
-    net = getattr(torchvision.models, backbone)(weights=None, num_classes=len(CLASSES))
+    """A torchvision network with five classes. Short runs want two things otherwise than torchvision has them: BatchNorm's momentum is 0.1
+    (0.01 is too slow), and EfficientNet drops no layers at random, which is for runs that overfit.
+    """
+    own = {"stochastic_depth_prob": 0.0} if backbone.startswith("efficientnet") else {}
+    net = getattr(torchvision.models, backbone)(weights=None, num_classes=len(CLASSES), **own)
     for layer in net.modules():
         if isinstance(layer, nn.BatchNorm2d):
             layer.momentum = 0.1
