@@ -17,7 +17,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use crate::Outcome;
-use crate::invocation::invocation;
+use crate::invocation::{file_name, invocation};
 
 /// Explain where the model and the real car disagree.
 ///
@@ -214,10 +214,6 @@ pub(crate) fn read(path: &Path, topics: &TopicMap) -> anyhow::Result<(StateSeque
         Some(sequence) => Ok((sequence, report)),
         None => bail!("{}: no state sequence", path.display()),
     }
-}
-
-fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
 fn header(bag: &Path, vehicle: &VehicleParameters, sequence: &StateSequence) -> Header {

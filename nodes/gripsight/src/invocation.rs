@@ -1,4 +1,6 @@
-//! The command as files record it.
+//! The command and its data as files record them.
+
+use std::path::Path;
 
 /// The command line, fit for a shell, with the output folder left open: where results lie does not belong to them.
 pub(crate) fn invocation(arguments: impl IntoIterator<Item = String>) -> String {
@@ -15,6 +17,11 @@ pub(crate) fn invocation(arguments: impl IntoIterator<Item = String>) -> String 
         folder_follows = argument == "--out";
     }
     words.join(" ")
+}
+
+/// The data's name without the folder it lies in.
+pub(crate) fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
 fn quoted(word: &str) -> String {

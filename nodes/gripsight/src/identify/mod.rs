@@ -25,7 +25,7 @@ use gripsight_vehicle::VehicleParameters;
 use crate::Outcome;
 use crate::camera::{NetworkArgs, prior_of_bag};
 use crate::diagnose::extended_model;
-use crate::invocation::invocation;
+use crate::invocation::{file_name, invocation};
 use progress::{Progress, Timing};
 use windows::Windows;
 
@@ -242,7 +242,6 @@ fn write(
     sequence: &StateSequence,
     result: &identification::Outcome,
 ) -> anyhow::Result<Vec<PathBuf>> {
-    let file_name = |path: &Path| path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
     let provenance = Provenance {
         car: car_name(args, vehicle),
         bag: file_name(&args.bag),
