@@ -37,6 +37,11 @@ run() { if $dry_run; then say "would run: $*"; else "$@"; fi; }
 
 command -v cargo >/dev/null || { say "no Rust toolchain: install cargo with rustup, then run this again"; exit 1; }
 
+if [[ $(uname -m) == x86_64 && -z ${RUSTFLAGS:-} ]] && ! grep -qw avx2 /proc/cpuinfo; then
+    say "this processor has no AVX2, which .cargo/config.toml builds for: export RUSTFLAGS='-C target-cpu=x86-64', then run this again"
+    exit 1
+fi
+
 # --- system packages -------------------------------------------------------------------------------------------------
 # A line of the list: package name, then `tests` where only the tests need it.
 wanted=()

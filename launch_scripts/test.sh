@@ -20,9 +20,9 @@ cargo build --workspace --bins --examples --locked
 
 step "tests"
 if cargo nextest --version >/dev/null 2>&1; then
-    cargo nextest run --workspace --locked --no-fail-fast
+    cargo nextest run --workspace --lib --bins --tests --locked --no-fail-fast
 else
-    cargo test --workspace --locked --no-fail-fast --tests
+    cargo test --workspace --lib --bins --tests --locked --no-fail-fast
 fi
 cargo test --workspace --locked --doc --quiet
 

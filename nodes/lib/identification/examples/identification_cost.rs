@@ -1,7 +1,7 @@
 //! Prints as CSV what a whole identification costs over the length of the drive and the width of the network, and draws it.
 //!
 //! ```text
-//! RAYON_NUM_THREADS=1 cargo run --release -p gripsight_identification --example cost -- cost.svg > cost.csv
+//! RAYON_NUM_THREADS=1 cargo run --release -p gripsight_identification --example identification_cost -- cost.svg > cost.csv
 //! ```
 //!
 //! Times are the smallest of a few, of the processor alone (Linux): what a shared machine adds is left out.

@@ -1,6 +1,6 @@
 //! Prints as CSV what training and streaming cost over sequence length, width and states, and draws the epochs.
 //!
-//!     cargo run --release -p gripsight_s4 --example cost -- cost.svg > cost.csv
+//!     cargo run --release -p gripsight_s4 --example network_cost -- cost.svg > cost.csv
 //!
 //! Times are the smallest of many on one core: what a shared machine adds is left out.
 

@@ -1,6 +1,6 @@
 //! What a diagnosis costs: time and memory over the length of the bag and over the number of candidates.
 //!
-//!     cargo run --release -p gripsight_gap --example cost -- FOLDER
+//!     cargo run --release -p gripsight_gap --example diagnosis_cost -- FOLDER
 //!
 //! Writes FOLDER/cost.csv, cost_length.svg and cost_candidates.svg there. Every case runs in a process of its own, three times over; the time is the median, the
 //! memory the peak of that process, which also simulates the drive.
