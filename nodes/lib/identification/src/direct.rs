@@ -107,13 +107,17 @@ pub(crate) fn direct(
     let (slips, _) = fitter.visited(&found);
     let mut peak =
         PerAxle { front: evidence(&found, 0, &slips.front), rear: evidence(&found, 4, &slips.rear) };
-    if let Some(prior) = prior {
-        let held = with_prior(&all, &found, &peak, prior);
-        let with_it = fitter.solve(&held, &fitter.training, &weights.sigma, 30);
+    if let Some(prior) =
+        prior.filter(|_| [peak.front, peak.rear].iter().any(|axle| axle.is_the_priors(prior)))
+    {
+        let [held, likely] = with_prior(&all, &found, &peak, prior)
+            .map(|all| (fitter.solve(&all, &fitter.training, &weights.sigma, 30), all));
+        let better = likely.0.linearization.cost < held.0.linearization.cost;
+        let (with_it, held) = if better { likely } else { held };
         if contradicts(prior, &peak, &found, &with_it) {
             peak.front.contradicts_prior = true;
             peak.rear.contradicts_prior = true;
-        } else if [peak.front, peak.rear].iter().any(|axle| axle.is_the_priors(Some(prior))) {
+        } else {
             (all, found) = (held, with_it);
         }
     }
@@ -138,8 +142,8 @@ pub(crate) fn direct(
     let fitted = tires_of(&found.parameters);
     Ok(Direct {
         tires: PacejkaParameters {
-            front: nearest(&points.front, &fitted.front, peak.front.is_the_priors(prior))?,
-            rear: nearest(&points.rear, &fitted.rear, peak.rear.is_the_priors(prior))?,
+            front: nearest(&points.front, &fitted.front, peak.front.prior_range(prior, fitted.front.d))?,
+            rear: nearest(&points.rear, &fitted.rear, peak.rear.prior_range(prior, fitted.rear.d))?,
         },
         corrections: corrections_of(&found.parameters),
         nuisance: Nuisance { combined_slip: 0.0, ..allowed },
@@ -308,14 +312,15 @@ impl Fitter<'_> {
 }
 
 /// The Magic Formula nearest to the forces of the richer model, over the slips driven: what Phi_p is for, a model without relaxation and combined slip.
+/// D lies within a range where the data do not show it.
 fn nearest(
     points: &[Point],
     start: &MagicFormula,
-    hold_d: bool,
+    d_range: Option<(f64, f64)>,
 ) -> Result<MagicFormula, IdentificationError> {
     let every = points.len().div_ceil(NEAREST_POINTS).max(1);
     let thin: Vec<Point> = points.iter().copied().step_by(every).collect();
-    Ok(extract(&thin, start, hold_d, true)?.axle)
+    Ok(extract(&thin, start, d_range, true)?.axle)
 }
 
 fn restart(all: &mut [Parameter], at: &[f64]) {

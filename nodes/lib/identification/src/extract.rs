@@ -19,11 +19,11 @@ pub(crate) struct Extraction {
 /// How much the curve may miss the points to keep C or E one sigma nearer to what is likely: their ridge is flat.
 const SHAPE_TRUST: f64 = 2e-3;
 
-/// Fits one axle. `hold_d` keeps D where it is: the data do not reach the peak. `shaped` holds C and E softly at what is likely; the paper does not.
+/// Fits one axle. `d_range` keeps D within it: the data do not reach the peak. `shaped` holds C and E softly at what is likely; the paper does not.
 pub(crate) fn extract(
     points: &[Point],
     start: &MagicFormula,
-    hold_d: bool,
+    d_range: Option<(f64, f64)>,
     shaped: bool,
 ) -> Result<Extraction, IdentificationError> {
     let mean_square = |axle: &MagicFormula| -> f64 {
@@ -37,10 +37,10 @@ pub(crate) fn extract(
         mean_square(&axle_of(x)) + if shaped { SHAPE_TRUST.powi(2) * shape } else { 0.0 }
     };
     let mut bounds = BOUNDS;
-    if hold_d {
-        bounds[2] = (start.d, start.d);
+    if let Some((low, high)) = d_range {
+        bounds[2] = (low.max(bounds[2].0), high.min(bounds[2].1));
     }
-    let x = [start.b, start.c, start.d, start.e];
+    let x = [start.b, start.c, start.d.clamp(bounds[2].0, bounds[2].1), start.e];
     let config = NelderMeadConfig { tolerance_x: 1e-4, tolerance_cost: 1e-10, ..NelderMeadConfig::default() };
     let Minimum { x, evaluations, .. } = minimize(cost, &x, &bounds, &config)?;
     let axle = axle_of(&x);

@@ -257,7 +257,7 @@ impl Identification {
         let Swept { sweep, epochs, residual_loss, .. } = swept;
         let robust = self.config.method == Method::Robust;
         let fit = |points: &[Point], start: &MagicFormula, reached: bool| {
-            extract(points, start, robust && !reached, robust)
+            extract(points, start, (robust && !reached).then_some((start.d, start.d)), robust)
         };
         let (at, peak) = (&self.candidate.phi_p, &self.direct.peak);
         let front = fit(&sweep.points.front, &at.front, peak.front.reached)?;

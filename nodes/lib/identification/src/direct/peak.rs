@@ -25,9 +25,22 @@ pub(crate) struct PeakEvidence {
 }
 
 impl PeakEvidence {
-    /// Whether D is the friction prior's: the data do not show the peak, and the prior is neither below what they do show nor against them.
+    /// Whether D is the friction prior's: the data do not show the peak, and the prior is neither further below what they do show than its sigma
+    /// nor against them.
     pub(crate) fn is_the_priors(&self, prior: Option<FrictionPrior>) -> bool {
-        !self.reached && !self.contradicts_prior && prior.is_some_and(|p| p.mu >= self.height)
+        !self.reached && !self.contradicts_prior && prior.is_some_and(|p| p.mu + p.sigma >= self.height)
+    }
+
+    /// Whether a friction prior is the largest force that was shown, within its sigma.
+    pub(crate) fn agrees_with(&self, prior: FrictionPrior) -> bool {
+        (prior.mu - self.height).abs() <= prior.sigma
+    }
+
+    /// Where Phi_p's D may lie, where it is the prior's: between the prior and the force that was shown where they agree, else where the fit left it.
+    pub(crate) fn prior_range(&self, prior: Option<FrictionPrior>, fitted: f64) -> Option<(f64, f64)> {
+        let prior = prior.filter(|_| self.is_the_priors(prior))?;
+        let agreed = (prior.mu.min(self.height), prior.mu.max(self.height));
+        Some(if self.agrees_with(prior) { agreed } else { (fitted, fitted) })
     }
 }
 

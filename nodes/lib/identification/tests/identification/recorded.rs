@@ -6,7 +6,7 @@ use gripsight_identification::{Config, FrictionPrior, Outcome, ResidualKind, ide
 use gripsight_signals::StateSequence;
 use gripsight_vehicle::VehicleParameters;
 
-use crate::support::recorded;
+use crate::support::{demo, recorded};
 
 fn run(
     sequence: &StateSequence,
@@ -103,4 +103,22 @@ fn a_poor_v_y_is_named() {
     assert!(!outcome.accepted);
     assert!(outcome.reasons.iter().any(|r| r.starts_with("v_y scatters by 0.1")), "{:?}", outcome.reasons);
     assert!(outcome.drive_next.iter().any(|d| d.contains("v_y")));
+}
+
+#[test]
+fn a_prior_counts_within_its_sigma_of_what_the_drive_shows_and_not_far_from_it() {
+    // The front tires stay just below their peak, D = 1.02.
+    let (sequence, vehicle) = demo("demo_race_car");
+    let with = |mu: f64| run(&sequence, &vehicle, Some(mu), ResidualKind::None);
+    for mu in [0.95, 1.0, 1.1] {
+        let outcome = with(mu);
+        let front = outcome.peak_friction.front;
+        assert!(outcome.accepted && front.from_prior, "{mu}: {:?}", outcome.reasons);
+        assert!((front.value - 1.02).abs() < 0.1, "{mu}: {front:?}");
+    }
+    for mu in [0.7, 1.6] {
+        let Outcome { accepted, reasons, .. } = with(mu);
+        let front = &reasons[0];
+        assert!(!accepted && front.starts_with("front peak") && front.contains("prior"), "{mu}: {reasons:?}");
+    }
 }

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use gripsight_reference_car::{
     CarParameters, Course, DriverKind, EffectSetting, Friction, Recording, Scenario, Simulation,
@@ -69,15 +69,21 @@ pub(crate) fn recorded(name: &str, length_s: f64) -> Option<(StateSequence, Vehi
         println!("skipped: no recording {}", folder.display());
         return None;
     }
-    let vehicle =
-        VehicleParameters::from_ros_yaml(&std::fs::read_to_string(folder.join("vehicle.yaml")).unwrap())
-            .unwrap();
+    Some(read(&folder.join(format!("{name}.mcap")), &folder.join("vehicle.yaml"), length_s))
+}
+
+/// A demo bag of this repository.
+pub(crate) fn demo(name: &str) -> (StateSequence, VehicleParameters) {
+    let folder = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../bags"));
+    let [bag, vehicle] = ["mcap", "vehicle.yaml"].map(|end| folder.join(format!("{name}.{end}")));
+    read(&bag, &vehicle, f64::INFINITY)
+}
+
+/// The first window of a bag.
+fn read(bag: &Path, vehicle: &Path, length_s: f64) -> (StateSequence, VehicleParameters) {
+    let vehicle = VehicleParameters::from_ros_yaml(&std::fs::read_to_string(vehicle).unwrap()).unwrap();
     let window = WindowConfig { length_s, hop_s: length_s };
-    let (mut sequences, _) = gripsight_bag::read_sequences(
-        &folder.join(format!("{name}.mcap")),
-        &gripsight_bag::TopicMap::default(),
-        window,
-    )
-    .unwrap();
-    Some((sequences.swap_remove(0), vehicle))
+    let (mut sequences, _) =
+        gripsight_bag::read_sequences(bag, &gripsight_bag::TopicMap::default(), window).unwrap();
+    (sequences.swap_remove(0), vehicle)
 }
