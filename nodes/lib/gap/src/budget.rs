@@ -41,8 +41,8 @@ pub(crate) struct Models<'m> {
     pub(crate) state: &'m State,
     /// With all that the search found.
     pub(crate) found: &'m State,
-    /// The last look, in which nothing more was found.
-    pub(crate) last: &'m Round,
+    /// The look at what else there is beside the effects named.
+    pub(crate) others: &'m Round,
 }
 
 /// What models are scored on: the held-out blocks, or another bag.
@@ -95,7 +95,7 @@ const WIDEST_SHARE: f64 = 2.0;
 impl Budget {
     /// Scores the models.
     pub(crate) fn of(engine: &Engine<'_>, scorer: &Scorer<'_>, windows: &Split, models: &Models<'_>) -> Self {
-        let Models { nominal, null, state, found, last } = *models;
+        let Models { nominal, null, state, found, others } = *models;
         let Scorer { engine: scorer, windows: on, scored_on, .. } = scorer;
         let blocks = |effects: &[EffectId], flexible: Option<&Flexible>, p: &[f64]| {
             by_block(scorer.recording, on, &scorer.score(effects, flexible, p, on))
@@ -112,7 +112,7 @@ impl Budget {
             steps.push(blocks(&state.effects, None, &state.parameters));
         }
         let unnamed = found.named.iter().filter(|e| !state.named.contains(e)).map(|&e| (e, found));
-        let others = last.refits.iter().filter(|r| !found.named.contains(&r.effect));
+        let others = others.refits.iter().filter(|r| !found.named.contains(&r.effect));
         let candidates = unnamed
             .chain(others.take(CANDIDATES).map(|r| (r.effect, &r.state)))
             .filter_map(|(effect, fitted)| {

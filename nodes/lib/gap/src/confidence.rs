@@ -2,6 +2,8 @@
 
 /// Chance, shared with what is alike and was not tried, from which an effect is named: below even odds it is a candidate.
 pub(crate) const LEAST_CHANCE: f64 = 0.5;
+/// Less than this is explained by none of the effects found, as far as their chances go.
+const LEAST_EXPLAINED: f64 = 1e-3;
 
 /// What tells an effect that is the cause from one that stands in for it.
 #[derive(Debug, Clone, Copy)]
@@ -10,16 +12,21 @@ pub(crate) struct Signs {
     pub(crate) left: f64,
     /// The same of the room that the effect sits in.
     pub(crate) left_in_its_room: f64,
+    /// Whether the effect pushes along the car, where little else stands in for it.
+    pub(crate) is_along: bool,
     /// What the effect explains beside the others, per residual as well.
     pub(crate) explained: f64,
     /// How far its size drifts between data, as a share of it.
     pub(crate) drift: f64,
-    /// Its size over the size that matters.
-    pub(crate) relative_size: f64,
     /// How many effects the data cannot tell from it.
     pub(crate) confused: usize,
     /// How many effects do nearly the same and were not among the candidates.
     pub(crate) untried: usize,
+    /// How far the tires beside it lie from those handed over, in units of the trust in them.
+    pub(crate) tire_shift: f64,
+    /// How many of the effects found beside it are no causes themselves, as far as can be told: a cause needs none, and what stands in for
+    /// something else leaves others to mend the difference.
+    pub(crate) doubtful_beside: f64,
 }
 
 /// A sign that speaks against an effect.
@@ -35,32 +42,49 @@ impl Signs {
     /// Chance that the effect, or one of those alike that were not tried, is the cause: a logistic regression on the effects found in
     /// development cases (true ones against those that stood in for others or for nothing), 2026-11-21; see tests/results/withheld.
     pub(crate) fn chance(self) -> f64 {
-        /// Of an effect that nothing speaks against.
-        const ODDS: f64 = 4.99;
+        /// Of an effect that nothing speaks against, and how much more of one along the car.
+        const ODDS: f64 = 5.16;
+        const ALONG: f64 = 2.48;
         const MOST: f64 = 0.99;
-        let odds = ODDS - self.doubts().iter().map(|doubt| doubt.odds).sum::<f64>();
+        let along = if self.is_along { ALONG } else { 0.0 };
+        let odds = ODDS + along - self.doubts().iter().map(|doubt| doubt.odds).sum::<f64>();
         (1.0 + (-odds).exp()).recip().min(MOST)
     }
 
+    /// The signs of several effects found together, with how many of the others are doubtful: each by its chance with nothing beside it, and in
+    /// full from a tenth of what the effect itself explains.
+    pub(crate) fn together(alone: &[Self]) -> Vec<Self> {
+        const COUNTS: f64 = 0.1;
+        let doubt = |of: &Self, other: &Self| {
+            let share = other.explained.max(LEAST_EXPLAINED) / of.explained.max(LEAST_EXPLAINED);
+            (1.0 - other.chance()) * (share / COUNTS).min(1.0)
+        };
+        let beside = |i: usize| {
+            let others = alone.iter().enumerate().filter(|(j, _)| *j != i);
+            others.map(|(_, other)| doubt(&alone[i], other)).sum()
+        };
+        alone.iter().enumerate().map(|(i, &of)| Self { doubtful_beside: beside(i), ..of }).collect()
+    }
+
     /// What speaks against it.
-    fn doubts(self) -> [Doubt; 5] {
-        const PER_LOG_SHARE: f64 = 0.89;
-        const PER_LOG_DRIFT: f64 = 1.57;
-        const PER_LEFT: f64 = 0.32;
-        const PER_LEFT_UNTRIED: f64 = 2.33;
-        const PER_SIZE: f64 = 1.40;
-        const PER_TWIN: f64 = 0.93;
+    fn doubts(self) -> [Doubt; 6] {
+        const PER_LOG_SHARE: f64 = 0.71;
+        const PER_LOG_DRIFT: f64 = 1.96;
+        const PER_LEFT_UNTRIED: f64 = 2.35;
+        const PER_TWIN: f64 = 0.37;
+        const PER_SHIFT: f64 = 0.83;
+        const PER_BESIDE: f64 = 1.00;
         /// Share of what the effect explains, and drift, below which no more is learned.
         const LEAST_SHARE: f64 = 0.01;
         const LEAST_DRIFT: f64 = 0.05;
-        /// Size over the size that matters from which an effect is large, and by how much more it grows no more unlikely: no drive that the
-        /// rule was fitted on has a cause of more than twice that size, so that it knows large stand-ins alone.
-        const LARGE: f64 = 2.0;
-        const LARGER: f64 = 1.0;
-        const LEAST_EXPLAINED: f64 = 1e-3;
-        // What an effect's own room may explain beside it, in steps of so much, up to so many; less where one that is alike was not tried.
-        let steps = |usual: f64, step: f64| ((self.left_in_its_room - usual) / step).clamp(0.0, 3.0);
-        let untried = if self.untried > 0 { steps(0.02, 0.03) } else { 0.0 };
+        /// A shift of the tires that says no more where it is larger.
+        const MOST_SHIFT: f64 = 4.0;
+        /// What an effect's own room may explain beside it where one that is alike was not tried, and steps of more, up to so many.
+        const USUAL: f64 = 0.02;
+        const STEP: f64 = 0.03;
+        const MOST_STEPS: f64 = 3.0;
+        let steps = ((self.left_in_its_room - USUAL) / STEP).clamp(0.0, MOST_STEPS);
+        let untried = if self.untried > 0 { steps } else { 0.0 };
         let share = self.left / self.explained.max(LEAST_EXPLAINED);
         let percent = |share: f64| (100.0 * share).round();
         [
@@ -73,16 +97,21 @@ impl Signs {
                 text: format!("its size differs by {} % between parts of the data", percent(self.drift)),
             },
             Doubt {
-                odds: PER_LEFT * steps(0.03, 0.05) + PER_LEFT_UNTRIED * untried,
-                text: "free terms of its own place find more to explain".to_owned(),
-            },
-            Doubt {
-                odds: PER_SIZE * (self.relative_size - LARGE).clamp(0.0, LARGER),
-                text: format!("its size is {:.1} times one that matters", self.relative_size),
+                odds: PER_LEFT_UNTRIED * untried,
+                text: "free terms of its own place find more to explain, and what is alike was not tried"
+                    .to_owned(),
             },
             Doubt {
                 odds: PER_TWIN * self.confused as f64,
                 text: "other effects do nearly as well".to_owned(),
+            },
+            Doubt {
+                odds: PER_SHIFT * self.tire_shift.min(MOST_SHIFT),
+                text: "the tires beside it are unlike those handed over".to_owned(),
+            },
+            Doubt {
+                odds: PER_BESIDE * self.doubtful_beside,
+                text: "it needs others beside it that are hardly causes themselves".to_owned(),
             },
         ]
     }
@@ -110,11 +139,13 @@ mod tests {
         let cause = Signs {
             left: 0.01,
             left_in_its_room: 0.0,
+            is_along: false,
             explained: 2.0,
             drift: 0.05,
-            relative_size: 1.0,
             confused: 0,
             untried: 0,
+            tire_shift: 0.3,
+            doubtful_beside: 0.0,
         };
         let named = |signs: Signs| signs.chance() >= LEAST_CHANCE;
         assert!(named(cause) && cause.confidence() > 0.9);
@@ -126,13 +157,12 @@ mod tests {
         assert!(named(untried) && untried.confidence() < 0.5);
         assert!(named(Signs { left_in_its_room: 0.1, ..cause }));
         assert!(!named(Signs { left_in_its_room: 0.1, ..untried }));
-        assert!(!named(Signs { left: 0.6, drift: 0.3, ..cause }));
-        // A large size speaks against it, and the larger one no more; alone it does not take the name.
-        let large = Signs { relative_size: 3.0, left: 0.1, ..cause };
-        assert!(named(large) && large.chance() < Signs { left: 0.1, ..cause }.chance());
-        assert_eq!(large.chance(), Signs { relative_size: 4.4, ..large }.chance());
+        // Much is left and the size drifts: not sideways, where much can stand in for it.
+        let unsure = Signs { left: 0.6, drift: 0.3, ..cause };
+        assert!(!named(unsure) && named(Signs { is_along: true, ..unsure }));
         assert!(named(Signs { left: 0.3, drift: 0.1, ..cause }));
-        assert!(!named(Signs { left: 0.3, drift: 0.1, ..large }));
+        // Tires that are unlike those handed over speak against it.
+        assert!(Signs { tire_shift: 2.0, ..cause }.chance() < cause.chance());
         // The same leftovers beside an effect whose size carries over, and beside one whose size does not.
         assert!(named(Signs { left: 0.2, ..cause }));
         assert!(!named(Signs { left: 0.2, drift: 0.8, ..cause }));
@@ -142,5 +172,29 @@ mod tests {
         let chances: Vec<f64> =
             [0.0, 0.02, 0.1, 0.5, 2.0].map(|left| Signs { left, ..cause }.chance()).to_vec();
         assert!(chances[0] <= 0.99 && chances.windows(2).all(|w| w[0] >= w[1]), "{chances:?}");
+    }
+
+    #[test]
+    fn what_needs_doubtful_effects_beside_it_is_doubted_itself() {
+        let cause = Signs {
+            left: 0.1,
+            left_in_its_room: 0.0,
+            is_along: false,
+            explained: 2.0,
+            drift: 0.1,
+            confused: 0,
+            untried: 0,
+            tire_shift: 0.3,
+            doubtful_beside: 0.0,
+        };
+        let doubtful = Signs { drift: 1.0, explained: 0.5, ..cause };
+        let of_first = |signs: &[Signs]| Signs::together(signs)[0].chance();
+        assert_eq!(of_first(&[cause]), cause.chance());
+        // Another cause beside it hardly matters, doubtful ones do, the more so the more there are; what explains next to nothing does not.
+        assert!(of_first(&[cause, cause]) > 0.9 * cause.chance());
+        assert!(of_first(&[cause, doubtful]) < of_first(&[cause, cause]));
+        assert!(of_first(&[cause, doubtful, doubtful, doubtful]) < LEAST_CHANCE);
+        let small = Signs { explained: 0.002, ..doubtful };
+        assert!(of_first(&[cause, small, small, small]) > 0.9 * cause.chance());
     }
 }

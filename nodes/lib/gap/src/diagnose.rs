@@ -9,7 +9,7 @@ use crate::engine::Engine;
 use crate::outcome::{DetectionLimit, Diagnosis, Invisible, TirePair, Unexplained};
 use crate::recording::Recording;
 use crate::rooms::{Left, explained};
-use crate::search::{Found, search};
+use crate::search::{Found, completed, search};
 use crate::select::reweigh;
 use crate::state::State;
 use crate::transfer::drifts;
@@ -118,7 +118,7 @@ fn explain(
     }
     reweigh(&mut engine, &first, &search_windows);
     let null = engine.fit(&[], &first.parameters, Some(first.starts), &search_windows, 15);
-    let Found { state, evidence, last, costs } =
+    let Found { state, evidence, first, last, costs } =
         search(&mut engine, &null, &library, &search_windows, progress);
     let (null, state) = if search_windows.windows.len() < windows.training.windows.len() {
         progress("fitting on all training blocks");
@@ -150,11 +150,13 @@ fn explain(
         engine.fit(&named, &values, Some(state.starts.clone()), &windows.training, 10)
     };
     progress("scoring on held-out data");
-    let models = Models { nominal: &nominal, null: &null, state: &model, found: &state, last: &last };
+    // What else there is stands beside what is named.
+    let others = if named.is_empty() { &completed(&engine, first, &search_windows) } else { &last };
+    let models = Models { nominal: &nominal, null: &null, state: &model, found: &state, others };
     let budget = Budget::of(&engine, &scorer, &windows, &models);
     let (verdict, mut reasons) = decide(&budget, &claims, &remains, &costs);
     reasons.extend(noise::caveat(&recording));
-    let effects = rank(&engine, &claims, [&model, &state], blocks, &last, &budget);
+    let effects = rank(&engine, &claims, [&model, &state], blocks, others, &budget);
     let scored_windows =
         if windows.held_out.windows.is_empty() { &windows.training } else { &windows.held_out };
     let on_all = split(&recording, false).training;

@@ -14,6 +14,8 @@ pub(crate) struct Found {
     pub(crate) state: State,
     /// For each of them, in the order of `state.named`: what else was tried in its place.
     pub(crate) evidence: Vec<Round>,
+    /// The first look, beside the tires alone.
+    pub(crate) first: Round,
     /// The last look, in which nothing more was found.
     pub(crate) last: Round,
     /// Cost per residual with nothing claimed, and with each effect more.
@@ -40,6 +42,7 @@ pub(crate) fn search(
     let mut evidence: Vec<Round> = Vec::new();
     let mut costs = vec![null.cost / null.residuals];
     let mut number = 0;
+    let mut first = None;
     let last = loop {
         number += 1;
         progress(&format!("comparing {} effects, round {number}", library.len() - state.named.len()));
@@ -48,6 +51,7 @@ pub(crate) fn search(
         let Some(next) = here.winner().filter(|_| here.taken && room).map(|r| r.state.clone()) else {
             break completed(engine, here, windows);
         };
+        first.get_or_insert_with(|| here.clone());
         evidence.push(here);
         state = settled(engine, &next, windows);
         let [delay, lag] = DELAY_AND_LAG;
@@ -61,7 +65,8 @@ pub(crate) fn search(
         drop_needless(engine, &mut state, &mut evidence, windows);
         costs.push(state.cost / state.residuals);
     };
-    let mut found = Found { state, evidence, last, costs };
+    let first = first.unwrap_or_else(|| last.clone());
+    let mut found = Found { state, evidence, first, last, costs };
     if found.state.named.len() > 1 {
         progress("challenging each effect found");
         found.challenge(engine, &library, windows);
@@ -70,7 +75,7 @@ pub(crate) fn search(
 }
 
 /// With the sizes of its candidates told: looks at the problem around those that were not fitted to the end.
-fn completed(engine: &Engine<'_>, mut round: Round, windows: &Windows) -> Round {
+pub(crate) fn completed(engine: &Engine<'_>, mut round: Round, windows: &Windows) -> Round {
     for state in round.refits.iter_mut().map(|r| &mut r.state).filter(|s| s.fit.is_none()) {
         *state = engine.fit(&state.named, &state.parameters, Some(state.starts.clone()), windows, 0);
     }

@@ -230,7 +230,8 @@ fn acceptable(engine: &Engine<'_>, r: &Refit, before: &State, number: usize) -> 
     };
     let residuals = before.residuals;
     let remaining = (before.cost - thresholds::NOISE_COST * residuals).max(0.05 * before.cost);
-    r.z > thresholds::LEAST_Z
+    // What sits in one part of the lap is in few blocks: their scatter says nothing.
+    (r.effect.is_of_a_place() || r.z > thresholds::LEAST_Z)
         && r.relative_size < thresholds::MOST_SIZE
         && r.gain > thresholds::LEAST_GAIN * residuals
         && r.gain > thresholds::LEAST_SHARE[number.min(1)] * remaining

@@ -70,27 +70,35 @@ pub(crate) fn claims(
     library: &[EffectId],
     blocks: &[usize],
 ) -> Vec<Claim> {
-    let claim = |(number, (&effect, round)): (usize, (&EffectId, &Round))| {
-        let mut confused = confused(round, effect);
+    let signs = |(number, (&effect, round)): (usize, (&EffectId, &Round))| {
         let found = round.refits.iter().find(|r| r.effect == effect);
-        let untried: Vec<EffectId> =
-            effect.spec().alike.iter().filter(|e| !library.contains(e)).copied().collect();
-        let drift = remains.drifts.get(number).copied().unwrap_or(f64::INFINITY);
-        let signs = Signs {
+        Signs {
             left: remains.after.most(),
             left_in_its_room: remains.after.of(effect.room()),
+            is_along: effect.is_along(),
             explained: remains.explained.get(number).copied().unwrap_or_default(),
-            drift,
-            relative_size: found.map_or(f64::INFINITY, |r| r.relative_size),
-            confused: confused.len(),
-            untried: untried.len(),
-        };
-        let named = signs.chance() >= LEAST_CHANCE && is_told(engine, state, effect, drift, blocks);
+            drift: remains.drifts.get(number).copied().unwrap_or(f64::INFINITY),
+            confused: confused(round, effect).len(),
+            untried: untried(effect, library).count(),
+            tire_shift: found.map_or(f64::INFINITY, |r| engine.tire_shift(&r.state)),
+            doubtful_beside: 0.0,
+        }
+    };
+    let alone: Vec<Signs> = state.named.iter().zip(evidence).enumerate().map(signs).collect();
+    let claim = |((&effect, round), signs): ((&EffectId, &Round), Signs)| {
+        let named = signs.chance() >= LEAST_CHANCE && is_told(engine, state, effect, signs.drift, blocks);
+        let untried: Vec<EffectId> = untried(effect, library).collect();
+        let mut confused = confused(round, effect);
         confused.extend(&untried);
         let doubts = if named { Vec::new() } else { signs.heavy_doubts() };
-        Claim { effect, confidence: signs.confidence(), confused, untried, doubts, drift, named }
+        Claim { effect, confidence: signs.confidence(), confused, untried, doubts, drift: signs.drift, named }
     };
-    state.named.iter().zip(evidence).enumerate().map(claim).collect()
+    state.named.iter().zip(evidence).zip(Signs::together(&alone)).map(claim).collect()
+}
+
+/// What does nearly the same as an effect and is not in the library.
+fn untried(effect: EffectId, library: &[EffectId]) -> impl Iterator<Item = EffectId> {
+    effect.spec().alike.iter().copied().filter(|e| !library.contains(e))
 }
 
 /// The verdict, with its reasons.
@@ -163,13 +171,13 @@ pub(crate) fn decide(
 }
 
 /// The effects named, with their sizes in the `model` that holds no others, then the other candidates by what each would close beside them,
-/// with theirs in the search's last `state`.
+/// with theirs in the search's last `state`, or where `others` were compared.
 pub(crate) fn rank(
     engine: &Engine<'_>,
     claims: &[Claim],
     [model, state]: [&State; 2],
     blocks: &[usize],
-    last: &Round,
+    others: &Round,
     budget: &Budget,
 ) -> Vec<RankedEffect> {
     let mut step = 0;
@@ -196,12 +204,12 @@ pub(crate) fn rank(
             confused_with: claim.confused.iter().map(|e| e.name()).collect(),
         });
     }
-    let rest = last.refits.iter().filter(|r| r.gain > 0.0 && r.relative_size > LEAST_LISTED);
+    let rest = others.refits.iter().filter(|r| r.gain > 0.0 && r.relative_size > LEAST_LISTED);
     for r in rest.filter(|r| claims.iter().all(|c| c.effect != r.effect)) {
         out.push(RankedEffect {
             name: r.effect.name(),
             accepted: false,
-            parameters: sizes(engine, &r.state, r.effect, UNTRIED, &last.blocks),
+            parameters: sizes(engine, &r.state, r.effect, UNTRIED, &others.blocks),
             gap_closed_fraction: budget.closed_by_candidate(r.effect),
             confidence: 0.0,
             confused_with: Vec::new(),

@@ -253,6 +253,11 @@ impl EffectId {
         matches!(self, Self::LowGripPatch | Self::RoadBank | Self::RoadSlope)
     }
 
+    /// Whether it pushes along the car: the command and the longitudinal acceleration show it, and the tires' lateral forces hardly mind.
+    pub(crate) fn is_along(self) -> bool {
+        matches!(self, Self::AeroDrag | Self::RollingResistance | Self::MassError | Self::RoadSlope)
+    }
+
     /// Where it sits: whose free terms can do what it does.
     pub(crate) fn room(self) -> Room {
         match self {
