@@ -238,7 +238,7 @@ fn library(
     let met = |need: Need| match need {
         Need::LongitudinalCommand => recording.has_command,
         Need::Accelerometer => recording.channels.contains(&crate::Channel::LateralAcceleration),
-        Need::Laps => recording.laps.laps >= 1.5,
+        Need::Pose => recording.laps.lap_m > 0.0,
         Need::ReferenceTires => trusted,
     };
     let mut library = Vec::new();

@@ -79,7 +79,7 @@ pub(crate) struct Run {
     pub(crate) lap_share: Vec<f64>,
     /// Heading of the pose; 0 without one.
     pub(crate) heading_rad: Vec<f64>,
-    /// Where on the course, as an angle: of the distance along the lap, without laps the heading.
+    /// Where on the course, as an angle: of the distance along it, without a pose the heading.
     pub(crate) place_rad: Vec<f64>,
     /// Lateral velocity and yaw rate, smoothed: what slips were before a window starts.
     pub(crate) smooth: [Vec<f64>; 2],

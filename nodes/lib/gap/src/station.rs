@@ -1,19 +1,19 @@
-//! The place on the lap, from the pose alone: the first lap is the ruler for all later ones.
+//! The place on the course, from the pose alone: the first lap is the ruler for all later ones, or the way driven where no lap was closed.
 
 use gripsight_signals::Segment;
 
 use crate::smooth::median;
 
-/// Laps of a recording.
+/// The course of a recording.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Laps {
-    /// Distance along the lap over its length, per segment and sample; 0 without laps.
+    /// Distance along the course over its length, per segment and sample; 0 without a pose.
     pub(crate) share: Vec<Vec<f64>>,
-    /// Length of the lap; 0 where no lap was closed.
+    /// Length of the lap; where none was closed, of the way driven and a stretch more that keeps its ends apart. 0 without a pose.
     pub(crate) lap_m: f64,
-    /// Laps driven.
-    pub(crate) laps: f64,
-    /// The first closed lap, point by point: x, y, heading.
+    /// Whether a lap was closed.
+    pub(crate) closed: bool,
+    /// The first closed lap, or the way driven, point by point: x, y, heading.
     ruler: Vec<(f64, f64, f64)>,
 }
 
@@ -21,11 +21,15 @@ pub(crate) struct Laps {
 const CLOSE_SHARE: f64 = 0.03;
 /// How far ahead of the last place the next is looked for, over the lap.
 const LOOK_AHEAD_SHARE: f64 = 0.1;
-/// A drive that is further off another one's lap, over the lap, is on another course.
+/// A drive that is further off another one's course, over its length, is on another one.
 const OTHER_COURSE_SHARE: f64 = 0.02;
+/// Stretch between the ends of a course that is not closed, over the way driven, and the place on it where a sample is that is off the course.
+const APART: f64 = 0.2;
+const OFF_COURSE: f64 = 1.0 - 0.5 * APART / (1.0 + APART);
+/// Points of a course that is not closed that places are looked for among, at most.
+const MOST_POINTS: usize = 2000;
 
-/// Finds laps and places. Without a pose, or without a closed lap, the places are all 0. With `known` laps of another drive over the same
-/// course, places are theirs.
+/// Finds laps and places. Without a pose the places are all 0. With the `known` course of another drive, places are on that one.
 pub(crate) fn stations(segments: &[Segment], known: Option<&Laps>) -> Laps {
     let none = || Laps { share: segments.iter().map(|s| vec![0.0; s.len()]).collect(), ..Laps::default() };
     if segments.iter().any(|s| s.x_m.is_empty() || s.yaw_rad.is_empty()) {
@@ -33,38 +37,46 @@ pub(crate) fn stations(segments: &[Segment], known: Option<&Laps>) -> Laps {
     }
     let points: Vec<(f64, f64, f64)> =
         segments.iter().flat_map(|s| (0..s.len()).map(|k| (s.x_m[k], s.y_m[k], s.yaw_rad[k]))).collect();
-    let ruler: &[_] = match known.map(|k| &k.ruler) {
-        Some(ruler) => ruler,
-        None => first_lap(&points).map_or(&[], |(from, to)| &points[from..=to]),
+    let (ruler, closed) = match known {
+        Some(known) => (&known.ruler[..], known.closed),
+        None => match first_lap(&points) {
+            Some((from, to)) => (&points[from..=to], true),
+            None => (&points[..], false),
+        },
     };
-    if ruler.is_empty() {
-        return none();
-    }
     let mut along = vec![0.0];
     for w in ruler.windows(2) {
         along.push(along[along.len() - 1] + (w[1].0 - w[0].0).hypot(w[1].1 - w[0].1));
     }
-    let lap_m = along[along.len() - 1];
-    let driven: f64 = points.windows(2).map(|w| (w[1].0 - w[0].0).hypot(w[1].1 - w[0].1)).sum();
+    let way_m = along[along.len() - 1];
+    let lap_m = if closed { way_m } else { (1.0 + APART) * way_m };
+    if lap_m <= 0.0 {
+        return none();
+    }
     let mut near: Option<usize> = None;
     let mut off_m = Vec::with_capacity(points.len());
-    let share = segments
-        .iter()
-        .map(|s| {
-            (0..s.len())
-                .map(|k| {
-                    let place = nearest(ruler, s.x_m[k], s.y_m[k], near);
-                    near = Some(place);
-                    off_m.push((ruler[place].0 - s.x_m[k]).hypot(ruler[place].1 - s.y_m[k]));
-                    along[place] / lap_m
-                })
-                .collect()
-        })
-        .collect();
-    if known.is_some() && median(off_m) > OTHER_COURSE_SHARE * lap_m {
+    let mut place = |k: usize| {
+        let (x_m, y_m, _) = points[k];
+        let place = match (closed, known) {
+            (true, _) => nearest(ruler, x_m, y_m, near),
+            (false, Some(_)) => nearest_of_all(ruler, x_m, y_m),
+            (false, None) => k,
+        };
+        near = Some(place);
+        off_m.push((ruler[place].0 - x_m).hypot(ruler[place].1 - y_m));
+        let is_off = !closed && off_m[off_m.len() - 1] > OTHER_COURSE_SHARE * lap_m;
+        if is_off { OFF_COURSE } else { along[place] / lap_m }
+    };
+    let mut first = 0;
+    let mut share = Vec::with_capacity(segments.len());
+    for s in segments {
+        share.push((first..first + s.len()).map(&mut place).collect());
+        first += s.len();
+    }
+    if closed && known.is_some() && median(off_m) > OTHER_COURSE_SHARE * lap_m {
         return stations(segments, None);
     }
-    Laps { share, lap_m, laps: driven / lap_m, ruler: ruler.to_vec() }
+    Laps { share, lap_m, closed, ruler: ruler.to_vec() }
 }
 
 /// First and last sample of the first closed lap: the heading has turned by a whole turn, and the car is back.
@@ -101,6 +113,13 @@ fn nearest(ruler: &[(f64, f64, f64)], x_m: f64, y_m: f64, near: Option<usize>) -
     places.into_iter().min_by(|&a, &b| square(a).total_cmp(&square(b))).unwrap_or(0)
 }
 
+/// The nearest of some points along the whole of a course.
+fn nearest_of_all(ruler: &[(f64, f64, f64)], x_m: f64, y_m: f64) -> usize {
+    let square = |i: usize| (ruler[i].0 - x_m).powi(2) + (ruler[i].1 - y_m).powi(2);
+    let step = ruler.len().div_ceil(MOST_POINTS).max(1);
+    (0..ruler.len()).step_by(step).min_by(|&a, &b| square(a).total_cmp(&square(b))).unwrap_or(0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -124,5 +143,31 @@ mod tests {
             let off = laps.share[0][k] - expected;
             assert!((off - off.round()).abs() < 0.01, "{k}: {} against {expected}", laps.share[0][k]);
         }
+    }
+
+    #[test]
+    fn half_a_lap_is_a_course_too_and_another_drive_finds_its_places_on_it() {
+        let arc = |from: f64, to: f64, radius_m: f64| {
+            let n = 800;
+            let turn = move |k: usize| from + (to - from) * k as f64 / n as f64;
+            Segment {
+                dt_s: 0.01,
+                v_x_mps: vec![1.0; n],
+                x_m: (0..n).map(|k| radius_m * turn(k).cos()).collect(),
+                y_m: (0..n).map(|k| radius_m * turn(k).sin()).collect(),
+                yaw_rad: (0..n).map(|k| turn(k) + 1.57).collect(),
+                ..Segment::default()
+            }
+        };
+        let half = stations(&[arc(0.0, 3.0, 10.0)], None);
+        assert!(!half.closed);
+        approx::assert_relative_eq!(half.lap_m, 36.0, max_relative = 0.01);
+        approx::assert_relative_eq!(half.share[0][400], 15.0 / 36.0, max_relative = 0.01);
+        // Beside it, from its middle on and beyond its end.
+        let other = stations(&[arc(1.5, 4.5, 10.1)], Some(&half));
+        approx::assert_relative_eq!(other.share[0][0], 15.0 / 36.0, max_relative = 0.01);
+        approx::assert_relative_eq!(other.share[0][200], 22.5 / 36.0, max_relative = 0.01);
+        assert_eq!(other.share[0][799], OFF_COURSE);
+        assert_eq!(other.lap_m, half.lap_m);
     }
 }

@@ -127,11 +127,11 @@ pub struct Moment<T> {
     pub force_x_mps2: f64,
     /// Time since the start of the recording.
     pub minutes: f64,
-    /// Distance along the lap over the lap's length, in 0..1; 0 without laps.
+    /// Distance along the lap over the lap's length, in 0..1, or along the way driven where no lap was closed; 0 without a pose.
     pub lap_share: f64,
-    /// Length of the lap; 0 without laps.
+    /// Length of the lap, or of the way driven and a fifth more; 0 without a pose.
     pub lap_m: f64,
-    /// Where on the course, as an angle that comes round once a lap: of the distance along the lap, without laps the heading.
+    /// Where on the course, as an angle that comes round once a lap: of the distance along it, without a pose the heading.
     pub place_rad: f64,
 }
 

@@ -22,7 +22,7 @@ const LEAST_INFORMATION: f64 = 1e-9;
 
 /// For each effect of a state how far its size drifts, as a share of it: what `other` data (a model on them, and their windows) ask for, the rest of the model moving along within its
 /// priors, plus half the largest difference between halves of the windows (slow and fast, calm and at the limit, off and on the power,
-/// right and left), the rest of the model as it is.
+/// right and left), the rest of the model as it is; of what sits in one part of the lap only the former.
 pub(crate) fn drifts(
     engine: &Engine<'_>,
     state: &State,
@@ -44,7 +44,9 @@ pub(crate) fn drifts(
                 [low, high].map(|(part, starts)| change(&here, state, effect, (part, starts), false));
             low.zip(high).map_or(MOST, |(low, high)| 0.5 * (high - low).abs())
         });
-        elsewhere.min(MOST) + between.fold(0.0, f64::max).min(MOST)
+        // Halves of the windows are other places: what sits in one is not compared between them.
+        let between = if effect.is_of_a_place() { 0.0 } else { between.fold(0.0, f64::max).min(MOST) };
+        elsewhere.min(MOST) + between
     };
     state.named.iter().map(drift).collect()
 }

@@ -78,7 +78,7 @@ impl Effect for GripBalance {
     }
 }
 
-/// A place on the lap with less grip. Start and length are fitted as shares of the lap.
+/// A place on the course with less grip. Start and length are fitted as shares of the lap, or of the way driven where none was closed.
 #[derive(Debug)]
 pub(super) struct LowGripPatch;
 
@@ -87,13 +87,13 @@ const EDGE: f64 = 0.1;
 
 impl Effect for LowGripPatch {
     const SPEC: EffectSpec = EffectSpec {
-        needs: &[Need::Laps],
+        needs: &[Need::Pose],
         flat_at_null: true,
         ..spec(
             "low_grip_patch",
             "D (1 - depth w(s)), w = 1 on the patch, with soft edges",
             "dirt, water, paint",
-            "two or more passes above 60 % of the limit",
+            "a pass above 60 % of the limit; two or more tell it from what happened once",
             &[
                 ParameterSpec { name: "depth", unit: "1", null: 0.0, size: [0.2, 0.2], range: [0.0, 4.0] },
                 ParameterSpec {

@@ -1,5 +1,5 @@
-//! Effects of the road's shape. Over a lap the angle is its mean and the first harmonic of the distance; where no lap was closed, of the
-//! heading, as on a tilted plane.
+//! Effects of the road's shape. The angle is its mean and the first harmonic of the distance over the lap, or over the way driven where none
+//! was closed; without a pose, of the heading, as on a tilted plane.
 
 use gripsight_vehicle::{GRAVITY_MPS2, Real};
 
