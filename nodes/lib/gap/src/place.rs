@@ -58,7 +58,7 @@ pub(crate) fn places(engine: &Engine<'_>, nominal: &Nominal, windows: &Windows, 
     out.slip = binned(2, "rad");
     out.steering_rate = binned(3, "rad/s");
     out.longitudinal_acceleration = binned(4, "m/s2");
-    if recording.laps.closed {
+    if recording.laps.laps > 0.0 {
         out.track_position = binned(5, "m");
     }
     out.time = binned(6, "s");

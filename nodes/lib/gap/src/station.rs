@@ -11,8 +11,8 @@ pub(crate) struct Laps {
     pub(crate) share: Vec<Vec<f64>>,
     /// Length of the lap; where none was closed, of the way driven and a stretch more that keeps its ends apart. 0 without a pose.
     pub(crate) lap_m: f64,
-    /// Whether a lap was closed.
-    pub(crate) closed: bool,
+    /// Laps driven; 0 where none was closed.
+    pub(crate) laps: f64,
     /// The first closed lap, or the way driven, point by point: x, y, heading.
     ruler: Vec<(f64, f64, f64)>,
 }
@@ -38,7 +38,7 @@ pub(crate) fn stations(segments: &[Segment], known: Option<&Laps>) -> Laps {
     let points: Vec<(f64, f64, f64)> =
         segments.iter().flat_map(|s| (0..s.len()).map(|k| (s.x_m[k], s.y_m[k], s.yaw_rad[k]))).collect();
     let (ruler, closed) = match known {
-        Some(known) => (&known.ruler[..], known.closed),
+        Some(known) => (&known.ruler[..], known.laps > 0.0),
         None => match first_lap(&points) {
             Some((from, to)) => (&points[from..=to], true),
             None => (&points[..], false),
@@ -76,7 +76,8 @@ pub(crate) fn stations(segments: &[Segment], known: Option<&Laps>) -> Laps {
     if closed && known.is_some() && median(off_m) > OTHER_COURSE_SHARE * lap_m {
         return stations(segments, None);
     }
-    Laps { share, lap_m, closed, ruler: ruler.to_vec() }
+    let driven: f64 = points.windows(2).map(|w| (w[1].0 - w[0].0).hypot(w[1].1 - w[0].1)).sum();
+    Laps { share, lap_m, laps: if closed { driven / lap_m } else { 0.0 }, ruler: ruler.to_vec() }
 }
 
 /// First and last sample of the first closed lap: the heading has turned by a whole turn, and the car is back.
@@ -160,7 +161,7 @@ mod tests {
             }
         };
         let half = stations(&[arc(0.0, 3.0, 10.0)], None);
-        assert!(!half.closed);
+        assert_eq!(half.laps, 0.0);
         approx::assert_relative_eq!(half.lap_m, 36.0, max_relative = 0.01);
         approx::assert_relative_eq!(half.share[0][400], 15.0 / 36.0, max_relative = 0.01);
         // Beside it, from its middle on and beyond its end.

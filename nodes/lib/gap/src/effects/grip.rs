@@ -87,13 +87,13 @@ const EDGE: f64 = 0.1;
 
 impl Effect for LowGripPatch {
     const SPEC: EffectSpec = EffectSpec {
-        needs: &[Need::Pose],
+        needs: &[Need::Passes],
         flat_at_null: true,
         ..spec(
             "low_grip_patch",
             "D (1 - depth w(s)), w = 1 on the patch, with soft edges",
             "dirt, water, paint",
-            "a pass above 60 % of the limit; two or more tell it from what happened once",
+            "two or more passes above 60 % of the limit",
             &[
                 ParameterSpec { name: "depth", unit: "1", null: 0.0, size: [0.2, 0.2], range: [0.0, 4.0] },
                 ParameterSpec {

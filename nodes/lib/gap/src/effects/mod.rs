@@ -36,8 +36,8 @@ pub enum Need {
     LongitudinalCommand,
     /// An inertial unit's accelerations.
     Accelerometer,
-    /// A pose.
-    Pose,
+    /// A pose with at least one and a half laps, or with a second drive over the same course.
+    Passes,
     /// Tires known from elsewhere (a file or a reference drive) and trusted.
     ReferenceTires,
 }
@@ -49,7 +49,9 @@ impl Need {
         match self {
             Self::LongitudinalCommand => "no longitudinal command is recorded",
             Self::Accelerometer => "no accelerometer is recorded",
-            Self::Pose => "no pose is recorded",
+            Self::Passes => {
+                "no pose over at least one and a half laps is recorded, and no second drive is held out"
+            }
             Self::ReferenceTires => {
                 "with the tires free it is the same as other tires: give --pacejka or a reference bag"
             }
