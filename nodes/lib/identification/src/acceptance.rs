@@ -196,8 +196,13 @@ fn peaks(run: &Identification, outcome: &Outcome, shape: &[String], verdict: &mu
         let what = format!("{axle} peak not reached: slip stayed within {furthest:.1} degrees");
         if from_prior {
             let bent: Vec<_> = shape.iter().filter(|name| name.starts_with(axle)).cloned().collect();
-            if bent.is_empty() || run.prior.is_some_and(|p| shown.agrees_with(p)) {
-                let mu = run.prior.map_or(f64::NAN, |p| p.mu);
+            let mu = run.prior.map_or(f64::NAN, |p| p.mu);
+            if run.prior.is_some_and(|p| shown.agrees_with(p)) {
+                let height = shown.height;
+                remarks.push(format!(
+                    "{what}; D = {value:.2} lies between the prior's {mu:.2} and the force shown, {height:.2}"
+                ));
+            } else if bent.is_empty() {
                 remarks.push(format!(
                     "{what}; D = {value:.2} is the prior's {mu:.2}, moved as far as data and its sigma say"
                 ));

@@ -1,8 +1,8 @@
 //! The reference car: another model, and known truth.
 
 use gripsight_identification::{
-    Config, FrictionPrior, Identification, IdentificationError, Method, Monitor, Next, PerAxle, ResidualKind,
-    Started, identify, train_residual,
+    Candidate, Config, FrictionPrior, Identification, IdentificationError, Method, Monitor, Next, PerAxle,
+    Range, ResidualKind, RunKey, SignalCorrections, Started, identify, train_residual,
 };
 use gripsight_reference_car::{EffectSetting, Recording};
 use gripsight_signals::StateSequence;
@@ -147,6 +147,26 @@ fn the_papers_method_runs_with_every_residual() {
         let outcome = identify(&sequence, &vehicle, prior, None, &config, &mut |_| {}).unwrap();
         assert!(outcome.phi_p.is_finite() && outcome.iterations >= 1, "{residual:?}");
     }
+}
+
+#[test]
+fn the_papers_network_learns_a_drive_to_one_side_for_both() {
+    let hull = |track: &str, method: Method| {
+        let (_, sequence, vehicle) = drive(scenario("f1tenth", track, 0.9, 0.8, 12).duration(15.0));
+        let config = Config { method, epochs: Some(2), ..Config::default() };
+        let candidate = Candidate {
+            key: RunKey::first(&sequence, &vehicle, &config),
+            phi_p: config.initial,
+            corrections: SignalCorrections::NONE,
+            mean_speed_mps: 3.0,
+        };
+        let mut go_on = |_| std::ops::ControlFlow::Continue(());
+        train_residual(&sequence, &vehicle, &candidate, &config, &mut go_on).unwrap().slip_range_rad.front
+    };
+    let both_sides = |slips: Range| -slips.low == slips.high;
+    assert!(both_sides(hull("steady_circle", Method::Paper)));
+    assert!(!both_sides(hull("steady_circle", Method::Robust)));
+    assert!(!both_sides(hull("club", Method::Paper)));
 }
 
 #[test]
