@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 use crate::error::ReferenceCarError;
 
 /// Names of the closed tracks.
-pub const TRACK_NAMES: [&str; 15] = [
+pub const TRACK_NAMES: [&str; 17] = [
     "oval", "club", "esses", "bean", "clover", "harbor", "valley", "quarry", "delta", "lagoon", "ridge",
-    "basin", "summit", "meadow", "canyon",
+    "basin", "summit", "meadow", "canyon", "plateau", "marsh",
 ];
 
 /// A closed centre line, sampled evenly by arc length.
@@ -70,6 +70,12 @@ fn shape(name: &str) -> Option<Shape> {
         "meadow" => Shape { size_m: 205.0, cosines: &[(1, 0.1), (2, 0.21)], sines: &[(3, -0.12), (4, 0.05)] },
         "canyon" => {
             Shape { size_m: 220.0, cosines: &[(2, -0.14), (3, 0.1), (5, 0.03)], sines: &[(1, 0.2), (2, 0.1)] }
+        }
+        "plateau" => {
+            Shape { size_m: 215.0, cosines: &[(1, 0.18), (3, -0.1)], sines: &[(2, -0.16), (4, 0.04)] }
+        }
+        "marsh" => {
+            Shape { size_m: 200.0, cosines: &[(2, 0.18), (4, -0.04)], sines: &[(1, -0.14), (3, 0.12)] }
         }
         _ => return None,
     };
