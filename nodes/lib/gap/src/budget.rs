@@ -105,7 +105,8 @@ impl Budget {
         for count in 1..state.named.len() {
             let named = &state.named[..count];
             let values = engine.carry(state, named);
-            let step = engine.look(named, &values, None, &windows.training, STEP_ITERATIONS);
+            let step =
+                engine.look(named, &values, Some(state.starts.clone()), &windows.training, STEP_ITERATIONS);
             steps.push(blocks(&step.effects, None, &step.parameters));
         }
         if !state.named.is_empty() {
@@ -118,7 +119,13 @@ impl Budget {
             .filter_map(|(effect, fitted)| {
                 let named = [&state.named[..], &[effect]].concat();
                 let values = engine.carry(fitted, &named);
-                let alone = engine.look(&named, &values, None, &windows.training, STEP_ITERATIONS);
+                let alone = engine.look(
+                    &named,
+                    &values,
+                    Some(state.starts.clone()),
+                    &windows.training,
+                    STEP_ITERATIONS,
+                );
                 let error = blocks(&alone.effects, None, &alone.parameters);
                 Some((effect, closed(steps.last()?, &error, &retuned)))
             })

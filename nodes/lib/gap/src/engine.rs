@@ -17,6 +17,9 @@ use crate::windows::Windows;
 /// Windows whose mean square is beyond this many sigma count less and less.
 pub(crate) const ROBUST_K: f64 = 3.0;
 
+/// Relative change of the cost under which a fit has converged: a hundredth of the least drop that an effect must bring.
+const TOLERANCE: f64 = 1e-5;
+
 /// Standard deviation that parameters of flexible terms are expected to have.
 pub(crate) const FLEXIBLE_RIDGE: f64 = 1.0;
 
@@ -155,7 +158,15 @@ impl<'a> Engine<'a> {
         parameters: &'p [Parameter],
         max_iterations: usize,
     ) -> Problem<'p, ExtendedModel<'a>> {
-        Problem { model, windows, sigma: &self.sigma, parameters, robust_k: ROBUST_K, max_iterations }
+        Problem {
+            model,
+            windows,
+            sigma: &self.sigma,
+            parameters,
+            robust_k: ROBUST_K,
+            tolerance: TOLERANCE,
+            max_iterations,
+        }
     }
 
     /// Fits the tires, the background and the effects claimed together; `values` in the order of [`Self::layout`].
@@ -301,6 +312,7 @@ impl<'a> Engine<'a> {
             sigma: &self.recording.sigma,
             parameters: &parameters,
             robust_k: f64::INFINITY,
+            tolerance: TOLERANCE,
             max_iterations: 6,
         };
         let end = shooting::descend(&problem, None);

@@ -1,5 +1,7 @@
 //! Candidates fitted on top of a model: a first look at each, then the best of them to the end.
 
+use rayon::prelude::*;
+
 use crate::effects::EffectId;
 use crate::engine::Engine;
 use crate::screen::Screened;
@@ -54,8 +56,8 @@ pub(crate) fn first_look(
     const ON_ITS_WAY: usize = 8;
     let effect = screened.effect;
     let spec = effect.spec();
-    // Where the derivative at the null says nothing, the start is a guess.
-    let steps = if spec.flat_at_null { 4 } else { 2 };
+    // Where the derivative at the null says nothing, starts are guesses: one step tells which is best, and it takes more to get anywhere.
+    let [first_steps, further_steps] = if spec.flat_at_null { [1, 3] } else { [2, 0] };
     let clamp = |values: Vec<f64>| -> Vec<f64> {
         values
             .into_iter()
@@ -78,7 +80,11 @@ pub(crate) fn first_look(
     }
     let mut named = state.named.clone();
     named.push(effect);
-    starts
+    let look = |values: &[f64], from: &[[f64; 2]], steps| {
+        engine.look(&named, values, Some(from.to_vec()), windows, steps)
+    };
+    let on = |s: State, steps: usize| look(&s.parameters, &s.starts, steps);
+    let best = starts
         .iter()
         .map(|own| {
             let change: Vec<f64> = own.iter().zip(&from).map(|(to, from)| to - from).collect();
@@ -87,15 +93,14 @@ pub(crate) fn first_look(
             values[place..].copy_from_slice(own);
             let bounds = engine.parameters(&named, &engine.layout(&named), &values, 1.0);
             values.iter_mut().zip(&bounds).for_each(|(v, p)| *v = v.clamp(p.low, p.high));
-            let look = engine.look(&named, &values, Some(state.starts.clone()), windows, steps);
-            if look.finite && look.cost > state.cost {
-                // With one parameter more it cannot end above the model without: it is on its way still.
-                return engine.look(&named, &look.parameters, Some(look.starts), windows, ON_ITS_WAY);
-            }
-            look
+            look(&values, &state.starts, first_steps)
         })
         .filter(|s| s.finite)
-        .min_by(|a, b| a.cost.total_cmp(&b.cost))
+        .min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    let best = if further_steps > 0 { on(best, further_steps) } else { best };
+    // With one parameter more it cannot end above the model without: it is on its way still.
+    let best = if best.cost > state.cost { on(best, ON_ITS_WAY) } else { best };
+    best.finite.then_some(best)
 }
 
 /// Fits to the end those of the first looks that may still win.
@@ -105,7 +110,7 @@ pub(crate) fn refits(engine: &Engine<'_>, state: &State, looks: Vec<State>, wind
     looks.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let best = looks.first().map_or(0.0, |s| s.cost);
     looks
-        .into_iter()
+        .into_par_iter()
         .enumerate()
         .map(|(i, look)| {
             let close = look.cost - best < thresholds::OUT_OF_REACH * (state.cost - best).max(0.0);
@@ -131,8 +136,13 @@ pub(crate) fn relative_size(engine: &Engine<'_>, effect: EffectId, own: &[f64]) 
         .fold(0.0, f64::max)
 }
 
-/// Starts of a patch: the places of the lap where more grip than elsewhere is missing.
-pub(crate) fn patch_starts(engine: &Engine<'_>, state: &State, windows: &Windows) -> Vec<Vec<f64>> {
+/// Starts of a patch: the places of the lap where more grip than elsewhere is missing, if a first step there promises more than `worth`.
+pub(crate) fn patch_starts(
+    engine: &Engine<'_>,
+    state: &State,
+    windows: &Windows,
+    worth: f64,
+) -> Vec<Vec<f64>> {
     const PLACES: usize = 12;
     let spec = EffectId::LowGripPatch.spec();
     let length = 0.6 / PLACES as f64 * 1.5;
@@ -149,6 +159,7 @@ pub(crate) fn patch_starts(engine: &Engine<'_>, state: &State, windows: &Windows
             (gain, start)
         })
         .collect();
+    found.retain(|(gain, _)| *gain > worth);
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let depth = engine.size(&spec.parameters[0]);
     found.iter().take(3).map(|&(_, start)| vec![depth, start, length]).collect()

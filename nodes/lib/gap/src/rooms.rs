@@ -3,6 +3,7 @@
 
 use gripsight_identification::shooting::{self, Linearization, Parameter};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use crate::effects::EffectId;
 use crate::engine::{Engine, FLEXIBLE_RIDGE};
@@ -69,7 +70,7 @@ impl Left {
             let flexible = Flexible::new(engine.recording, slip_rad, engine.vehicle.wheelbase_m(), &[room]);
             (room, gain(engine, state, windows, &flexible))
         };
-        Self { cost: engine.cost(state, windows), gains: Room::ALL.into_iter().map(gain).collect() }
+        Self { cost: engine.cost(state, windows), gains: Room::ALL.into_par_iter().map(gain).collect() }
     }
 
     /// The same on the calm part of the windows.

@@ -113,7 +113,8 @@ fn drop_needless(engine: &Engine<'_>, state: &mut State, evidence: &mut Vec<Roun
 impl Found {
     /// Puts every effect up against all others once more, with the rest of the model in place; then orders them by what each closes.
     fn challenge(&mut self, engine: &mut Engine<'_>, library: &[EffectId], windows: &Windows) {
-        for i in 0..self.state.named.len() {
+        // The last one was compared with all others in place when it was found.
+        for i in 0..self.state.named.len() - 1 {
             let effect = self.state.named[i];
             let base = without(engine, &self.state, effect, windows);
             let mut here = round(engine, &base, library, windows, 1);

@@ -1,6 +1,7 @@
 //! Which effects: joint refits of the best candidates, one effect after the other, each judged by what it closes of what remains.
 
 use gripsight_identification::shooting::Rollout;
+use rayon::prelude::*;
 
 use crate::effects::EffectId;
 use crate::engine::Engine;
@@ -21,6 +22,8 @@ pub(crate) mod thresholds {
     /// Candidates that promise less than this share of the best one's gain, or of the cost, are not refitted.
     pub(crate) const WORTH_OF_BEST: f64 = 0.06;
     pub(crate) const WORTH_OF_COST: f64 = 0.01;
+    /// What a step of a patch's depth must promise, as a share of that: its place and length are not fitted yet.
+    pub(crate) const WORTH_OF_PATCH: f64 = 0.5;
     /// Effects taken at most.
     pub(crate) const MOST_EFFECTS: usize = 5;
     /// Weighted cost per residual that noise alone leaves.
@@ -126,19 +129,20 @@ pub(crate) fn round(
     // A linear step may promise more than there is.
     let top = order.first().map_or(0.0, |s| s.gain.min(state.cost));
     let worth = (thresholds::WORTH_OF_BEST * top).max(thresholds::WORTH_OF_COST * state.cost);
-    let mut looks: Vec<State> = order
-        .into_iter()
-        .take(count)
-        .enumerate()
-        .filter(|(i, s)| *i == 0 || s.gain > worth)
-        .filter_map(|(_, s)| first_look(engine, state, s, windows, &[]))
-        .collect();
+    let promising = order.into_iter().take(count).enumerate().filter(|(i, s)| *i == 0 || s.gain > worth);
+    let mut tried: Vec<(Screened, Vec<Vec<f64>>)> = promising.map(|(_, s)| (s.clone(), Vec::new())).collect();
     for &effect in left.iter().filter(|e| e.spec().flat_at_null) {
-        let blank = Screened::unseen(effect);
-        let extra =
-            if effect == EffectId::LowGripPatch { patch_starts(engine, state, windows) } else { Vec::new() };
-        looks.extend(first_look(engine, state, &blank, windows, &extra));
+        let is_patch = effect == EffectId::LowGripPatch;
+        let least = thresholds::WORTH_OF_PATCH * worth;
+        let places = if is_patch { patch_starts(engine, state, windows, least) } else { Vec::new() };
+        if !is_patch || !places.is_empty() {
+            tried.push((Screened::unseen(effect), places));
+        }
     }
+    let looks: Vec<State> = tried
+        .par_iter()
+        .filter_map(|(screened, places)| first_look(engine, state, screened, windows, places))
+        .collect();
     let mut refits = refits(engine, state, looks, windows);
     refits.sort_by(|a, b| score(b).total_cmp(&score(a)));
     prefer_simple(&mut refits);

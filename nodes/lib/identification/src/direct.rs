@@ -24,7 +24,7 @@ use crate::extract::extract;
 use crate::rollout::{
     NAMES, Nuisance, PARAMETERS, SIGNALS, TireRollout, corrections_of, nuisance_of, tires_of,
 };
-use crate::shooting::{Fit, Parameter, Prior, Problem, StopReason, Window, fit};
+use crate::shooting::{Fit, Parameter, Prior, Problem, StopReason, TOLERANCE, Window, fit};
 use crate::sweep::Point;
 use crate::tires::{C_PRIOR, E_PRIOR, parameters};
 use crate::{FrictionPrior, IdentificationError, PerAxle, Range, SignalCorrections};
@@ -209,6 +209,7 @@ impl Fitter<'_> {
             sigma,
             parameters: all,
             robust_k: ROBUST_K,
+            tolerance: TOLERANCE,
             max_iterations: iterations,
         };
         fit(&problem, None)

@@ -2,7 +2,7 @@
 
 use crate::data::Data;
 use crate::rollout::{PARAMETERS, SIGNALS, TireRollout};
-use crate::shooting::{Parameter, Problem, Rollout, Window, fit};
+use crate::shooting::{Parameter, Problem, Rollout, TOLERANCE, Window, fit};
 
 /// Root mean square errors over windows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,6 +41,7 @@ pub(crate) fn best_starts(
         sigma: noise,
         parameters: &fixed,
         robust_k: f64::INFINITY,
+        tolerance: TOLERANCE,
         max_iterations: 6,
     };
     fit(&problem, None).starts

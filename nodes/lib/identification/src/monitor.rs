@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::data::Data;
 use crate::judge::rollout_errors;
 use crate::rollout::{TireRollout, vector_of};
-use crate::shooting::{Parameter, Problem, Window, fit};
+use crate::shooting::{Parameter, Problem, TOLERANCE, Window, fit};
 use crate::tires::D_BOUNDS;
 use crate::{AcceptedSet, Estimate, FrictionPrior, IdentificationError, PerAxle, vehicle_hash};
 
@@ -129,6 +129,7 @@ impl Monitor {
                 sigma: &sigma,
                 parameters: &parameters,
                 robust_k: ROBUST_K,
+                tolerance: TOLERANCE,
                 max_iterations: 15,
             };
             fit(&problem, None)

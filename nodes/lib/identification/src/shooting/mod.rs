@@ -97,9 +97,14 @@ pub struct Problem<'a, M> {
     pub parameters: &'a [Parameter],
     /// Robustness k; infinite for plain least squares.
     pub robust_k: f64,
+    /// Relative change of the cost under which the fit has converged.
+    pub tolerance: f64,
     /// Iterations at most.
     pub max_iterations: usize,
 }
+
+/// A tolerance under which results are the same to every digit that is stated.
+pub const TOLERANCE: f64 = 1e-6;
 
 impl<M> Problem<'_, M> {
     /// Places of the free parameters.

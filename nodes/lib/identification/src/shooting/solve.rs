@@ -99,9 +99,6 @@ impl Fit {
 /// Most clusters of the covariance: enough for its rank, few enough that a long drive's clusters outlast a corner.
 const CLUSTERS: usize = 40;
 
-/// Relative change of the cost under which a fit has converged.
-const TOLERANCE: f64 = 1e-6;
-
 /// Where a descent has come to.
 #[derive(Debug, Clone)]
 pub struct Descent {
@@ -169,7 +166,7 @@ fn run<M: Rollout>(
         };
         let change = (here.cost - at.cost) / here.cost.max(f64::MIN_POSITIVE);
         (parameters, starts) = (trial, trial_starts);
-        let converged = change < TOLERANCE;
+        let converged = change < problem.tolerance;
         if converged || iterations == problem.max_iterations {
             let stop = if converged { StopReason::Converged } else { StopReason::MaxIterations };
             return (Descent { parameters, starts, at, stop, iterations }, None);

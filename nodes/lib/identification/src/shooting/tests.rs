@@ -59,6 +59,7 @@ fn solve(plant: &Oscillator, parameters: &[Parameter], robust_k: f64) -> Fit {
             sigma: &[0.01],
             parameters,
             robust_k,
+            tolerance: TOLERANCE,
             max_iterations: 50,
         },
         None,
@@ -121,6 +122,7 @@ fn the_gradient_is_the_derivative_of_the_cost() {
         sigma: &[0.01],
         parameters: &parameters,
         robust_k: 2.0,
+        tolerance: TOLERANCE,
         max_iterations: 0,
     };
     // With the starts at their best, the gradient with the starts eliminated is the plain one.
