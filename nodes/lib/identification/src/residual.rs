@@ -186,7 +186,7 @@ fn hull(stretches: &[Stretch], car: &SingleTrack) -> PerAxle<Range> {
 }
 
 /// Slips to one side that stay within this share of those to the other say too little of it: the paper's sweep asks about both, and a network that has
-/// seen one or two corners makes up the other side. Full-size cars' first 9 s have 0.05 to 0.3 (development), the reference car's 0.5.
+/// seen one or two corners makes up the other side. Full-size cars' first 9 s have 0.05 to 0.3 (development), the reference car's 0.4 to 0.6.
 const ONE_SIDED: f64 = 0.4;
 
 /// Whether an axle hardly slipped to one side. The paper's networks then learn from the drive and from its mirror image.

@@ -56,7 +56,7 @@ pub fn identification_page(input: &IdentificationInput<'_>) -> Result<String, Re
                     @for chart in &pictures::residuals(outcome) { (figure(chart, "")?) }
                 }
             }))
-            (section("Rollout error over horizon, held-out data", false, &html! {
+            (section("Rollout error over horizon, held-out data", true, &html! {
                 div.pair {
                     @for chart in &pictures::horizon(outcome) { (figure(chart, "")?) }
                 }
