@@ -120,7 +120,7 @@ pub(crate) fn decide(
         let reached = (retuned - after) / (retuned - ceiling).max(1e-9);
         reasons.push(format!(
             "the named effects explain {:.0} % of what could be explained on held-out data",
-            100.0 * reached.min(1.0)
+            100.0 * reached.clamp(0.0, 1.0)
         ));
         for claim in claims.iter().filter(|c| c.named && !c.untried.is_empty()) {
             let others: Vec<&str> = claim.untried.iter().map(|e| e.name()).collect();

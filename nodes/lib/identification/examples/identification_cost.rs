@@ -61,7 +61,7 @@ fn draw(area: &Area<'_>, points: &[(f64, f64)], label: &str) -> Result<()> {
 }
 
 fn main() -> Result<()> {
-    let path = std::env::args().nth(1).context("usage: cost PICTURE.svg")?;
+    let path = std::env::args().nth(1).context("usage: identification_cost PICTURE.svg")?;
     println!("curve,duration_s,d_model,turns,processor_s");
     let mut lengths = Vec::new();
     for duration_s in DURATIONS_S {

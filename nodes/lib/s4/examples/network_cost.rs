@@ -118,7 +118,7 @@ fn draw<'a>(
 }
 
 fn main() -> Result<()> {
-    let path = std::env::args().nth(1).context("usage: cost PICTURE.svg")?;
+    let path = std::env::args().nth(1).context("usage: network_cost PICTURE.svg")?;
     println!("curve,architecture,samples,d_model,d_state,layers,weights,epoch_ms,step_us");
     let mut rows = Vec::new();
     for (architecture, _) in ARCHITECTURES {
