@@ -244,3 +244,73 @@ impl Test<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ResidualKind, RunKey};
+    use gripsight_vehicle::PacejkaParameters;
+
+    /// The 1:10 car, longer by a factor, of the same density.
+    fn enlarged(factor: f64) -> VehicleParameters {
+        let small = VehicleParameters::f1tenth();
+        VehicleParameters {
+            mass_kg: small.mass_kg * factor.powi(3),
+            yaw_inertia_kgm2: small.yaw_inertia_kgm2 * factor.powi(5),
+            l_f_m: small.l_f_m * factor,
+            l_r_m: small.l_r_m * factor,
+            h_cg_m: small.h_cg_m * factor,
+            ..small
+        }
+    }
+
+    #[test]
+    fn at_any_scale_the_test_saturates_the_front_tires_and_stays_on_their_curve() {
+        let phi_p = PacejkaParameters::from_array([10.0, 1.5, 1.0, 0.0, 13.0, 1.5, 1.05, 0.0]);
+        for factor in [1.0, 3.0, 10.0] {
+            let vehicle = enlarged(factor);
+            let mean_speed_mps = 1.5 * factor.sqrt();
+            let hull = Range { low: -0.25, high: 0.25 };
+            let model = ResidualModel {
+                key: RunKey {
+                    run_id: String::new(),
+                    sequence_id: 0,
+                    iteration: 0,
+                    vehicle_hash: String::new(),
+                    seed: 0,
+                },
+                phi_p,
+                architecture: ResidualKind::None,
+                d_model: 0,
+                d_state: 0,
+                layers: 0,
+                dt_s: 0.01,
+                horizon: 1,
+                input_mean: vec![],
+                input_scale: vec![],
+                output_scale: vec![],
+                weights: vec![],
+                slip_range_rad: PerAxle { front: hull, rear: hull },
+                v_x_range_mps: Range { low: 0.5 * mean_speed_mps, high: 6.0 * mean_speed_mps },
+                epochs: 0,
+                samples: 0,
+                training_loss: 0.0,
+                validation_loss: 0.0,
+            };
+            let found = sweep(&vehicle, &model, mean_speed_mps, Method::Robust).unwrap();
+            assert!(found.speed_mps > mean_speed_mps && found.speed_mps < 6.0 * mean_speed_mps);
+            let most = found.points.front.iter().map(|p| p.force.abs()).fold(0.0, f64::max);
+            assert!(most > 0.98 * phi_p.front.d, "{factor}: {most}");
+            for p in &found.points.front {
+                approx::assert_abs_diff_eq!(
+                    p.force,
+                    phi_p.front.normalized_force(p.slip_rad),
+                    epsilon = 0.02
+                );
+            }
+            // A mean speed at which the tires saturate anyway is kept.
+            let fast = sweep(&vehicle, &model, 1.1 * found.speed_mps, Method::Robust).unwrap();
+            assert_eq!(fast.speed_mps, 1.1 * found.speed_mps);
+        }
+    }
+}
