@@ -11,6 +11,7 @@ use crate::select::{Round, thresholds};
 use crate::sizes::{is_told, sizes};
 use crate::state::State;
 use crate::transfer::UNTRIED;
+use crate::trust::TireTrust;
 
 // Fixed on development cases, 2026-11-21: see tests/results/gap.
 
@@ -70,6 +71,8 @@ pub(crate) fn claims(
     library: &[EffectId],
     blocks: &[usize],
 ) -> Vec<Claim> {
+    // The chance was fitted on tires from a file; those of a drive are trusted more, and shift by more of it.
+    let by_file = Engine { trust: engine.trust.at_most(TireTrust::file()), ..engine.clone() };
     let signs = |(number, (&effect, round)): (usize, (&EffectId, &Round))| {
         let found = round.refits.iter().find(|r| r.effect == effect);
         Signs {
@@ -80,7 +83,7 @@ pub(crate) fn claims(
             drift: remains.drifts.get(number).copied().unwrap_or(f64::INFINITY),
             confused: confused(round, effect).len(),
             untried: untried(effect, library).count(),
-            tire_shift: found.map_or(f64::INFINITY, |r| engine.tire_shift(&r.state)),
+            tire_shift: found.map_or(f64::INFINITY, |r| by_file.tire_shift(&r.state)),
             doubtful_beside: 0.0,
         }
     };
