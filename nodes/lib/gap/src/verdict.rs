@@ -71,8 +71,11 @@ pub(crate) fn claims(
     library: &[EffectId],
     blocks: &[usize],
 ) -> Vec<Claim> {
-    // The chance was fitted on tires from a file; those of a drive are trusted more, and shift by more of it.
+    // The chance was fitted on tires from a file. Those of a drive are trusted more, and shift by more of it; where none were handed over, a
+    // shift says nothing.
     let by_file = Engine { trust: engine.trust.at_most(TireTrust::file()), ..engine.clone() };
+    let tire_shift =
+        |of: &State| if engine.trust == TireTrust::free() { 0.0 } else { by_file.tire_shift(of) };
     let signs = |(number, (&effect, round)): (usize, (&EffectId, &Round))| {
         let found = round.refits.iter().find(|r| r.effect == effect);
         Signs {
@@ -83,7 +86,7 @@ pub(crate) fn claims(
             drift: remains.drifts.get(number).copied().unwrap_or(f64::INFINITY),
             confused: confused(round, effect).len(),
             untried: untried(effect, library).count(),
-            tire_shift: found.map_or(f64::INFINITY, |r| by_file.tire_shift(&r.state)),
+            tire_shift: found.map_or(f64::INFINITY, |r| tire_shift(&r.state)),
             doubtful_beside: 0.0,
         }
     };
