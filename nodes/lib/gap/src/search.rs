@@ -42,6 +42,8 @@ pub(crate) fn search(
     let mut evidence: Vec<Round> = Vec::new();
     let mut costs = vec![null.cost / null.residuals];
     let mut number = 0;
+    // Whether the effect found last was compared with just those others in place that are there now.
+    let mut newest_is_compared = false;
     let mut first = None;
     let last = loop {
         number += 1;
@@ -54,6 +56,7 @@ pub(crate) fn search(
         first.get_or_insert_with(|| here.clone());
         evidence.push(here);
         state = settled(engine, &next, windows);
+        let found = state.named.len();
         let [delay, lag] = DELAY_AND_LAG;
         let place = |e: EffectId| state.named.iter().position(|n| *n == e);
         if let (Some(from), Some(to)) = (place(delay), place(lag)) {
@@ -63,13 +66,14 @@ pub(crate) fn search(
             library.retain(|e| *e != delay);
         }
         drop_needless(engine, &mut state, &mut evidence, windows);
+        newest_is_compared = state.named.len() == found;
         costs.push(state.cost / state.residuals);
     };
     let first = first.unwrap_or_else(|| last.clone());
     let mut found = Found { state, evidence, first, last, costs };
     if found.state.named.len() > 1 {
         progress("challenging each effect found");
-        found.challenge(engine, &library, windows);
+        found.challenge(engine, &library, windows, newest_is_compared);
     }
     found
 }
@@ -111,10 +115,16 @@ fn drop_needless(engine: &Engine<'_>, state: &mut State, evidence: &mut Vec<Roun
 }
 
 impl Found {
-    /// Puts every effect up against all others once more, with the rest of the model in place; then orders them by what each closes.
-    fn challenge(&mut self, engine: &mut Engine<'_>, library: &[EffectId], windows: &Windows) {
-        // The last one was compared with all others in place when it was found.
-        for i in 0..self.state.named.len() - 1 {
+    /// Puts every effect up against all others once more, with the rest of the model in place, but for the newest where that was done when it was
+    /// found; then orders them by what each closes.
+    fn challenge(
+        &mut self,
+        engine: &mut Engine<'_>,
+        library: &[EffectId],
+        windows: &Windows,
+        newest_is_compared: bool,
+    ) {
+        for i in 0..self.state.named.len() - usize::from(newest_is_compared) {
             let effect = self.state.named[i];
             let base = without(engine, &self.state, effect, windows);
             let mut here = round(engine, &base, library, windows, 1);
