@@ -1,5 +1,6 @@
 //! Candidates fitted on top of a model: a first look at each, then the best of them to the end.
 
+use gripsight_identification::shooting::Window;
 use rayon::prelude::*;
 
 use crate::effects::EffectId;
@@ -154,7 +155,10 @@ pub(crate) fn patch_starts(
             let mut values = state.parameters.clone();
             values.extend([0.0, start, length]);
             let depth = state.parameters.len();
-            let (gradient, information) = engine.slope(&effects, &values, depth, &state.starts, windows);
+            let near = passing(engine, windows, start + 0.5 * length, length);
+            let starts: Vec<[f64; 2]> = near.iter().map(|&k| state.starts[k]).collect();
+            let (gradient, information) =
+                engine.slope(&effects, &values, depth, &starts, &windows.picked(&near));
             let gain = if gradient < 0.0 { gradient * gradient / information.max(1e-9) } else { 0.0 };
             (gain, start)
         })
@@ -163,4 +167,14 @@ pub(crate) fn patch_starts(
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let depth = engine.size(&spec.parameters[0]);
     found.iter().take(3).map(|&(_, start)| vec![depth, start, length]).collect()
+}
+
+/// The windows that come nearer to a place of the lap than `near`, all as shares of it: only they feel what is there.
+fn passing(engine: &Engine<'_>, windows: &Windows, place: f64, near: f64) -> Vec<usize> {
+    let away = |share: f64| (share - place - (share - place).round()).abs();
+    let passes = |window: &Window| {
+        let shares = &engine.recording.runs[window.segment].lap_share;
+        shares[window.from..window.from + window.len].iter().any(|&share| away(share) < near)
+    };
+    (0..windows.windows.len()).filter(|&k| passes(&windows.windows[k])).collect()
 }

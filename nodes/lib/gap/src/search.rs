@@ -44,6 +44,8 @@ pub(crate) fn search(
     let mut number = 0;
     // Whether the effect found last was compared with just those others in place that are there now.
     let mut newest_is_compared = false;
+    // The model without each effect but the one found last.
+    let mut lacking = Vec::new();
     let mut first = None;
     let last = loop {
         number += 1;
@@ -65,7 +67,7 @@ pub(crate) fn search(
             state = without(engine, &state, delay, windows);
             library.retain(|e| *e != delay);
         }
-        drop_needless(engine, &mut state, &mut evidence, windows);
+        lacking = drop_needless(engine, &mut state, &mut evidence, windows);
         newest_is_compared = state.named.len() == found;
         costs.push(state.cost / state.residuals);
     };
@@ -73,7 +75,7 @@ pub(crate) fn search(
     let mut found = Found { state, evidence, first, last, costs };
     if found.state.named.len() > 1 {
         progress("challenging each effect found");
-        found.challenge(engine, &library, windows, newest_is_compared);
+        found.challenge(engine, &library, windows, lacking, newest_is_compared);
     }
     found
 }
@@ -97,36 +99,42 @@ pub(crate) fn without(engine: &Engine<'_>, state: &State, effect: EffectId, wind
     engine.fit(&named, &engine.carry(state, &named), Some(state.starts.clone()), windows, SETTLE)
 }
 
-/// A later effect may explain what an earlier one stood in for.
-fn drop_needless(engine: &Engine<'_>, state: &mut State, evidence: &mut Vec<Round>, windows: &Windows) {
-    while state.named.len() > 1 {
-        let newest = state.named.len() - 1;
-        let least = (0..newest)
-            .map(|i| (i, without(engine, state, state.named[i], windows)))
-            .min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
-        match least {
-            Some((i, simpler)) if !needed(&simpler, state) => {
-                *state = simpler;
+/// A later effect may explain what an earlier one stood in for. Returns the models without each but the newest of what is left.
+fn drop_needless(
+    engine: &Engine<'_>,
+    state: &mut State,
+    evidence: &mut Vec<Round>,
+    windows: &Windows,
+) -> Vec<State> {
+    loop {
+        let older = &state.named[..state.named.len() - 1];
+        let mut lacking: Vec<State> = older.iter().map(|e| without(engine, state, *e, windows)).collect();
+        let least = (0..lacking.len()).min_by(|&a, &b| lacking[a].cost.total_cmp(&lacking[b].cost));
+        match least.filter(|&i| !needed(&lacking[i], state)) {
+            Some(i) => {
+                *state = lacking.swap_remove(i);
                 evidence.remove(i);
             }
-            _ => break,
+            None => return lacking,
         }
     }
 }
 
 impl Found {
-    /// Puts every effect up against all others once more, with the rest of the model in place, but for the newest where that was done when it was
-    /// found; then orders them by what each closes.
+    /// Puts every effect up against all others once more, with the rest of the model in place (`lacking`: the models without the effects, as far as
+    /// they are at hand), but for the newest where that was done when it was found; then orders them by what each closes.
     fn challenge(
         &mut self,
         engine: &mut Engine<'_>,
         library: &[EffectId],
         windows: &Windows,
+        lacking: Vec<State>,
         newest_is_compared: bool,
     ) {
+        let mut lacking = lacking.into_iter();
         for i in 0..self.state.named.len() - usize::from(newest_is_compared) {
             let effect = self.state.named[i];
-            let base = without(engine, &self.state, effect, windows);
+            let base = lacking.next().unwrap_or_else(|| without(engine, &self.state, effect, windows));
             let mut here = round(engine, &base, library, windows, 1);
             let own = match here.refits.iter().position(|r| r.effect == effect) {
                 Some(place) => place,

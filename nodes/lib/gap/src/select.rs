@@ -18,7 +18,7 @@ pub(crate) mod thresholds {
     pub(crate) const REFITS: [usize; 2] = [9, 6];
     /// How many of them are fitted to the end, and how far behind the best, in shares of its gain, they may lie after a first look.
     pub(crate) const FINALISTS: usize = 4;
-    pub(crate) const OUT_OF_REACH: f64 = 0.7;
+    pub(crate) const OUT_OF_REACH: f64 = 0.5;
     /// Candidates that promise less than this share of the best one's gain, or of the cost, are not refitted.
     pub(crate) const WORTH_OF_BEST: f64 = 0.06;
     pub(crate) const WORTH_OF_COST: f64 = 0.01;
