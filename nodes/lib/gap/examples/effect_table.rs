@@ -105,7 +105,7 @@ fn row(car: &CarParameters, name: &str, true_size: f64, d: &Diagnosis, time_s: f
     let own = d.effects.iter().find(|e| e.name == name);
     let sizing = effect_spec(name).ok().map_or("", |s| s.parameters[0].name);
     let size = own.and_then(|e| e.parameters.get(sizing).or(e.parameters.values().next()));
-    let unknown = EffectParameter { value: f64::NAN, low: f64::NAN, high: f64::NAN, unit: "1" };
+    let unknown = EffectParameter { value: f64::NAN, low: f64::NAN, high: f64::NAN, unit: "1", before: None };
     let p = size.unwrap_or(&unknown);
     let gap = &d.gap;
     let mut line = String::new();

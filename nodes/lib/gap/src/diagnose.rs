@@ -94,19 +94,23 @@ fn explain(
     let Usable { recording, windows } = usable;
     let other = request.held_out.map(|h| Recording::beside(h, Some(&recording))).transpose()?;
     progress("fitting the tires");
-    let (tires, trust) = match (request.given_tires(), request.reference) {
+    let earlier = match (request.given_tires(), request.reference) {
+        (None, Some(drive)) => Some(Earlier::of(drive, request.vehicle)?),
+        _ => None,
+    };
+    let (tires, trust) = match (request.given_tires(), &earlier) {
         (Some(tires), _) => (tires, TireTrust::file()),
-        (None, Some(reference)) => {
-            let reference = Recording::new(reference)?;
-            let windows = split(&reference, false);
-            (fit_tires(&reference, request.vehicle, &windows.training)?, TireTrust::drive())
+        (None, Some(earlier)) => (earlier.state.tires(), TireTrust::drive()),
+        (None, None) => {
+            (first_fit(&recording, request.vehicle, &windows.training)?.tires(), TireTrust::free())
         }
-        (None, None) => (fit_tires(&recording, request.vehicle, &windows.training)?, TireTrust::free()),
     };
     let (library, invisible) = library(request, &recording, trust != TireTrust::free())?;
     let mut engine = Engine::new(&recording, request.vehicle, tires, trust);
     if let Some(model) = request.model {
         (engine.held, engine.usual) = model.parameters()?;
+    } else if let Some(earlier) = &earlier {
+        engine.usual = engine.background(&earlier.state);
     }
     let nominal = engine.nominal_model();
     // The search works on a bounded number of windows, the final fit on all.
@@ -135,8 +139,15 @@ fn explain(
     let noise_is_known = noise::is_known(&recording);
     let scorer = Scorer::new(&engine, other.as_ref(), &windows);
     let drifts = drifts(&engine, &state, &windows.training, scorer.apart());
-    let remains =
-        Remains { before: &before, after: &after, explained: &explained, drifts: &drifts, noise_is_known };
+    let norm = earlier.map_or_else(Left::default, |earlier| earlier.left(request.vehicle));
+    let remains = Remains {
+        norm: &norm,
+        before: &before,
+        after: &after,
+        explained: &explained,
+        drifts: &drifts,
+        noise_is_known,
+    };
     let blocks = &windows.training.block;
     let claims = claims(&engine, &evidence, &state, &remains, &library, blocks);
     // What is no more than a candidate is left out of the model.
@@ -202,12 +213,36 @@ fn explain(
     })
 }
 
-/// The best tires of a recording, with nothing known of them: from several starts, soft and stiff.
-fn fit_tires(
+/// A drive from before, and the model that was fitted to it: the norm for what is the matter now.
+#[derive(Debug)]
+struct Earlier {
+    recording: Recording,
+    windows: Windows,
+    state: State,
+}
+
+impl Earlier {
+    fn of(drive: &StateSequence, vehicle: &VehicleParameters) -> Result<Self, GapError> {
+        let recording = Recording::new(drive)?;
+        let windows = split(&recording, false).training.thinned(SEARCH_WINDOWS);
+        let state = first_fit(&recording, vehicle, &windows)?;
+        Ok(Self { recording, windows, state })
+    }
+
+    /// What the model leaves of it.
+    fn left(&self, vehicle: &VehicleParameters) -> Left {
+        let engine = Engine::new(&self.recording, vehicle, self.state.tires(), TireTrust::free());
+        let slip_rad = large_slip_rad(&engine, &self.state, &self.windows);
+        Left::by(&engine, &self.state, &self.windows, slip_rad)
+    }
+}
+
+/// The best tires and background of a recording, with nothing known of them: from several starts, soft and stiff.
+fn first_fit(
     recording: &Recording,
     vehicle: &VehicleParameters,
     windows: &Windows,
-) -> Result<PacejkaParameters, GapError> {
+) -> Result<State, GapError> {
     const FIRST: usize = 8;
     const REST: usize = 17;
     let windows = windows.thinned(SEARCH_WINDOWS);
@@ -223,7 +258,7 @@ fn fit_tires(
         .min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
     let (engine, state) = best.ok_or(GapError::NotFinite)?;
     let state = engine.look(&[], &state.parameters, Some(state.starts), &windows, REST);
-    if state.finite { Ok(state.tires()) } else { Err(GapError::NotFinite) }
+    if state.finite { Ok(state) } else { Err(GapError::NotFinite) }
 }
 
 /// The effects to consider, and those that these signals cannot show.

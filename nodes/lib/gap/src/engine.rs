@@ -102,16 +102,21 @@ impl<'a> Engine<'a> {
         Nominal { effects: given().map(|(e, _)| *e).collect(), parameters }
     }
 
-    /// The parameters with which the nominal model has an effect; at their null where it has not.
-    pub(crate) fn start_values(&self, effect: EffectId) -> Vec<f64> {
+    /// The parameters with which the nominal model has an effect, where it has it.
+    pub(crate) fn given(&self, effect: EffectId) -> Option<&[f64]> {
         let given = self.held.iter().chain(&self.usual).find(|(e, _)| *e == effect);
-        given.map_or_else(|| null_values(effect), |(_, own)| own.clone())
+        given.map(|(_, own)| own.as_slice())
     }
 
-    /// The parameters that stand for the effect's absence among the claims: those of the nominal model where it is held, else its null.
+    /// What a state has of the background.
+    pub(crate) fn background(&self, state: &State) -> Sized {
+        let background = BACKGROUND.into_iter().filter(|e| !state.named.contains(e));
+        background.filter_map(|e| Some((e, state.of(e)?.to_vec()))).collect()
+    }
+
+    /// The parameters that stand for the effect's absence among the claims: those of the nominal model where it has the effect, else its null.
     pub(crate) fn absent(&self, effect: EffectId) -> Vec<f64> {
-        let held = self.held.iter().find(|(e, _)| *e == effect);
-        held.map_or_else(|| null_values(effect), |(_, own)| own.clone())
+        self.given(effect).map_or_else(|| null_values(effect), <[f64]>::to_vec)
     }
 
     pub(crate) fn holds(&self, effect: EffectId) -> bool {
@@ -121,7 +126,7 @@ impl<'a> Engine<'a> {
     /// The nominal model, with its background in place to be fitted.
     pub(crate) fn blank(&self) -> Vec<f64> {
         let mut p = self.nominal_base();
-        p.extend(self.layout(&[]).into_iter().flat_map(|e| self.start_values(e)));
+        p.extend(self.layout(&[]).into_iter().flat_map(|e| self.absent(e)));
         p
     }
 

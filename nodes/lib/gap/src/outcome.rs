@@ -49,6 +49,9 @@ pub struct EffectParameter {
     pub high: f64,
     /// Unit; `1` for none.
     pub unit: &'static str,
+    /// What the model handed over, or that of the drive before, has of it: the effect is what is new. `None`: nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub before: Option<f64>,
 }
 
 /// An effect in the ranking.

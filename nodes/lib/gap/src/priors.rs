@@ -109,7 +109,7 @@ impl Engine<'_> {
                         low: spec.null + (spec.range[0] * size).max(-usual),
                         high: spec.null + usual,
                         free: true,
-                        prior: Some(Prior { mean: spec.null, sigma: usual }),
+                        prior: Some(Prior { mean: absent, sigma: usual }),
                     });
                     continue;
                 }

@@ -27,7 +27,7 @@ pub(crate) fn explained(engine: &Engine<'_>, state: &State, windows: &Windows) -
 }
 
 /// What a model leaves.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Left {
     /// Weighted cost per residual.
     pub(crate) cost: f64,
@@ -96,15 +96,16 @@ impl Left {
         self.gains.iter().find(|(r, _)| *r == room).map_or(0.0, |(_, gain)| *gain)
     }
 
-    /// The room that explains most, where that is telling.
-    pub(crate) fn telling(&self) -> Option<(Room, f64)> {
-        let telling = self.gains.iter().filter(|(room, gain)| *gain > TELLING * usual(*room));
+    /// The room that explains most, where that is telling beside what it explains in the drive before.
+    pub(crate) fn telling(&self, before: &Self) -> Option<(Room, f64)> {
+        let least = |room: Room| TELLING * (usual(room) + before.of(room).max(0.0));
+        let telling = self.gains.iter().filter(|(room, gain)| *gain > least(*room));
         telling.max_by(|a, b| a.1.total_cmp(&b.1)).copied()
     }
 
-    /// Whether there is something to be explained.
-    pub(crate) fn tells(&self) -> bool {
-        self.cost > TELLING_COST || self.telling().is_some()
+    /// Whether there is something to be explained beside what was there in the drive before.
+    pub(crate) fn tells(&self, before: &Self) -> bool {
+        self.cost > TELLING_COST * before.cost.max(1.0) || self.telling(before).is_some()
     }
 }
 
@@ -267,12 +268,18 @@ pub(crate) mod tests {
             let state = engine.fit(named, &values, Some(null.starts), &windows, 15);
             Left::where_calm(&engine, &state, &windows, LARGE_SLIP_RAD)
         };
+        let nothing = Left::default();
         let well = left(0.0, &[]);
-        assert!(!well.tells(), "{well:?}");
+        assert!(!well.tells(&nothing), "{well:?}");
         let late = left(0.06, &[]);
-        assert!(late.tells() && late.telling().is_some_and(|(room, _)| room == Room::Steering), "{late:?}");
+        assert!(
+            late.tells(&nothing) && late.telling(&nothing).is_some_and(|(room, _)| room == Room::Steering),
+            "{late:?}"
+        );
+        // What was there before is nothing new.
+        assert!(!late.tells(&late));
         let named = left(0.06, &[EffectId::SteeringLag]);
-        assert!(!named.tells() && named.most() < 0.02 * late.most(), "{named:?} {late:?}");
+        assert!(!named.tells(&nothing) && named.most() < 0.02 * late.most(), "{named:?} {late:?}");
         // A stand-in leaves the room more to explain.
         let stand_in = left(0.06, &[EffectId::TireRelaxation]);
         assert!(stand_in.most() > 5.0 * named.most().max(0.01), "{stand_in:?}");

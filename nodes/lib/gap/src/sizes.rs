@@ -30,13 +30,16 @@ pub(crate) fn sizes(
     let spec = effect.spec();
     let Some(own) = state.of(effect) else { return BTreeMap::new() };
     let halves = half_widths(engine, state, effect, drift, blocks);
+    let given = engine.given(effect);
     if spec.reported.is_empty() {
         return spec
             .parameters
             .iter()
+            .enumerate()
             .zip(own.iter().zip(&halves))
-            .map(|(r, (v, half))| {
-                (r.name, EffectParameter { value: *v, low: v - half, high: v + half, unit: r.unit })
+            .map(|((i, r), (v, half))| {
+                let before = given.map(|given| given[i]);
+                (r.name, EffectParameter { value: *v, low: v - half, high: v + half, unit: r.unit, before })
             })
             .collect();
     }
@@ -55,7 +58,7 @@ pub(crate) fn sizes(
                     high = high.max(v);
                 }
             }
-            (r.name, EffectParameter { value, low, high, unit: r.unit })
+            (r.name, EffectParameter { value, low, high, unit: r.unit, before: given.map(r.value) })
         })
         .collect()
 }

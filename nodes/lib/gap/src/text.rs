@@ -58,7 +58,11 @@ impl Diagnosis {
                 .parameters
                 .iter()
                 .map(|(name, p)| match p.value.is_finite() {
-                    true => format!("{name} {:.4} [{:.4}, {:.4}]", p.value, p.low, p.high),
+                    true => {
+                        let before =
+                            p.before.map(|before| format!(", before {before:.4}")).unwrap_or_default();
+                        format!("{name} {:.4} [{:.4}, {:.4}]{before}", p.value, p.low, p.high)
+                    }
                     false => format!("{name} none"),
                 })
                 .collect();

@@ -53,6 +53,8 @@ pub(crate) struct Claim {
 /// is not known.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Remains<'r> {
+    /// Of a drive from before; nothing where there is none.
+    pub(crate) norm: &'r Left,
     pub(crate) before: &'r Left,
     pub(crate) after: &'r Left,
     /// For each effect found, how much the cost is lower for it, beside the others.
@@ -150,14 +152,14 @@ pub(crate) fn decide(
         ));
     }
     let something = if remains.noise_is_known {
-        if let Some((room, gain)) = remains.before.telling() {
+        if let Some((room, gain)) = remains.before.telling(remains.norm) {
             reasons.push(format!(
                 "free terms of {} would take {gain:.2} off the cost per residual of {:.2}: more than where nothing is the matter",
                 room.name(),
                 remains.before.cost
             ));
         }
-        remains.before.tells()
+        remains.before.tells(remains.norm)
     } else {
         let cost = costs.first().copied().unwrap_or(f64::NAN);
         let explainable = (retuned - ceiling) / (retuned - 1.0).max(1e-9);

@@ -26,7 +26,7 @@ fn diagnosis() -> Diagnosis {
                 accepted,
                 parameters: BTreeMap::from([(
                     parameter,
-                    EffectParameter { value, low: 0.9 * value, high: 1.1 * value, unit },
+                    EffectParameter { value, low: 0.9 * value, high: 1.1 * value, unit, before: None },
                 )]),
                 gap_closed_fraction: estimate(0.62, 0.1),
                 confidence: if accepted { 0.93 } else { 0.0 },

@@ -135,7 +135,8 @@ pub(super) fn named(effect: &RankedEffect) -> String {
 
 fn size(name: &str, p: &EffectParameter) -> String {
     let (value, interval) = with_interval(p.value, p.low, p.high);
-    format!("{} {value} ({interval}){}", words(name), unit(p.unit))
+    let before = p.before.map_or_else(String::new, |before| format!(", before {}", significant(before, 3)));
+    format!("{} {value} ({interval}){}{before}", words(name), unit(p.unit))
 }
 
 /// A name without underscores, and without the unit at its end: that stands beside the number.
