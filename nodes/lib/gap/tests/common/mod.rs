@@ -10,16 +10,28 @@ use gripsight_vehicle::VehicleParameters;
 
 const MU: f64 = 0.95;
 
-/// One lap after the other on the club track, with steering dither.
+/// [`drive_at`] 88 % of the grip.
+#[allow(dead_code, reason = "not every user of this module drives at one pace")]
 pub(crate) fn drive(
     car: &CarParameters,
     effects: &[&str],
     duration_s: f64,
     seed: u64,
 ) -> anyhow::Result<StateSequence> {
+    drive_at(car, effects, 0.88, duration_s, seed)
+}
+
+/// One lap after the other on the club track, with steering dither.
+pub(crate) fn drive_at(
+    car: &CarParameters,
+    effects: &[&str],
+    pace: f64,
+    duration_s: f64,
+    seed: u64,
+) -> anyhow::Result<StateSequence> {
     let mut scenario = Scenario::new(car.clone())
         .course(Course::by_name("club", car, false)?)
-        .driver(DriverKind::Profile, 0.88)
+        .driver(DriverKind::Profile, pace)
         .dither(0.02)
         .friction(Friction::Uniform { mu: MU })
         .duration(duration_s)
