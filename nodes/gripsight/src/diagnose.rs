@@ -6,18 +6,19 @@ use std::time::Instant;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use gripsight_bag::{Bag, BagWriter, ReadReport, TopicMap, encode, read_sequences};
-use gripsight_gap::{Diagnosis, EffectId, ExtendedModelFile, Prediction, Request, Verdict, diagnose};
+use gripsight_bag::{ReadReport, Role, TopicMap, read_sequences};
+use gripsight_gap::{Diagnosis, EffectId, ExtendedModelFile, Request, Verdict, diagnose};
 use gripsight_identification::export::{read_tires, stamp_text};
 use gripsight_identification::vehicle_hash;
 use gripsight_report::{GapInput, Header, gap_page};
-use gripsight_signals::{OdometrySample, StateSequence, WindowConfig};
+use gripsight_signals::{StateSequence, WindowConfig};
 use gripsight_vehicle::VehicleParameters;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use crate::Outcome;
 use crate::invocation::{file_name, invocation};
+use crate::predictions::{self, Written};
+use crate::{Outcome, outputs};
 
 /// Explain where the model and the real car disagree.
 ///
@@ -58,7 +59,7 @@ pub(crate) struct DiagnoseArgs {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Write the bag that is explained once more, with the predictions beside its topics: /gripsight/nominal/odom of the model as it came,
-    /// /gripsight/extended/odom of the model with the effects found (open-loop rollouts of half a second).
+    /// /gripsight/extended/odom of the model with the effects found (open-loop rollouts of half a second, each from the recorded pose on).
     #[arg(long, value_name = "BAG")]
     predictions: Option<PathBuf>,
 }
@@ -67,6 +68,10 @@ fn names() -> String {
     let effects: Vec<&str> = EffectId::ALL.iter().map(|e| e.name()).collect();
     format!("Effects: {}", effects.join(", "))
 }
+
+/// What DIR receives; the model last, which is left out where the data cannot tell.
+const FILES: [&str; 4] = ["gap.json", "report.html", "timing.json", MODEL_FILE];
+const MODEL_FILE: &str = "extended_model.yaml";
 
 #[derive(Serialize)]
 struct Timing {
@@ -78,6 +83,12 @@ struct Timing {
 /// Runs the subcommand.
 pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     let start = Instant::now();
+    let bags: Vec<&Path> = [Some(&args.bag), args.bag2.as_ref(), args.heldout.as_ref()]
+        .into_iter()
+        .flatten()
+        .map(PathBuf::as_path)
+        .collect();
+    outputs::check(&args.out, &FILES, args.predictions.as_deref(), &bags)?;
     let topics = args.topics.as_deref().map(TopicMap::read).transpose()?.unwrap_or_default();
     let vehicle = vehicle(args.vehicle.as_deref())?;
     let tires = args.pacejka.as_deref().map(tires).transpose()?;
@@ -107,7 +118,6 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     .with_context(|| format!("cannot diagnose {}", subject.display()))?;
     spinner.finish_and_clear();
     let diagnosing_s = start.elapsed().as_secs_f64() - reading_s;
-    fs::create_dir_all(&args.out).with_context(|| format!("cannot make {}", args.out.display()))?;
     let header = header(subject, &vehicle, &sequence);
     let earlier = args.bag2.as_ref().map(|_| file_name(&args.bag));
     let page = gap_page(&GapInput {
@@ -117,21 +127,15 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         data_notes: &data_notes(&report),
     })?;
     let timing = Timing { reading_s, diagnosing_s, total_s: start.elapsed().as_secs_f64() };
-    let mut files = vec![
-        ("gap.json", serde_json::to_string_pretty(&result)? + "\n"),
-        ("report.html", page),
-        ("timing.json", serde_json::to_string_pretty(&timing)? + "\n"),
-    ];
+    let texts =
+        [serde_json::to_string_pretty(&result)? + "\n", page, serde_json::to_string_pretty(&timing)? + "\n"];
+    let mut files: Vec<(&str, String)> = FILES.into_iter().zip(texts).collect();
     if result.verdict != Verdict::NotIdentifiable {
-        files.push(("extended_model.yaml", result.extended_model.to_yaml()?));
+        files.push((MODEL_FILE, result.extended_model.to_yaml()?));
     }
     for (name, text) in &files {
         let path = args.out.join(name);
         fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
-    }
-    if let Some(path) = &args.predictions {
-        write_predictions(subject, path, sequence.start_stamp_ns, &result.series.predictions)
-            .with_context(|| format!("cannot write {}", path.display()))?;
     }
     if let Some(earlier) = earlier {
         println!("compared   {} with {earlier}: what has changed since", file_name(subject));
@@ -139,43 +143,33 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     print!("{}", result.text());
     let names: Vec<&str> = files.iter().map(|f| f.0).collect();
     println!("files      {} ({})", args.out.display(), names.join(", "));
+    if let Some(path) = &args.predictions {
+        let said = write_predictions(subject, &report, path, &sequence, &result)
+            .with_context(|| format!("cannot write {}", path.display()))?;
+        println!("predicted  {said}");
+    }
     Ok(outcome(&result))
 }
 
-/// Copies a bag, with what the models predicted in between, in the order of time.
+/// Writes the predictions, and says what was written.
 fn write_predictions(
     bag: &Path,
+    report: &ReadReport,
     out: &Path,
-    start_stamp_ns: i64,
-    predictions: &[Prediction],
-) -> anyhow::Result<()> {
-    const TOPICS: [&str; 2] = ["/gripsight/nominal/odom", "/gripsight/extended/odom"];
-    let bag = Bag::open(bag)?;
-    let mut writer = BagWriter::create(out)?;
-    let mut left = predictions.iter().peekable();
-    let stamp_ns = |p: &Prediction| start_stamp_ns + (p.time_s * 1e9).round() as i64;
-    let write = |writer: &mut BagWriter, p: &Prediction| -> anyhow::Result<()> {
-        for (topic, model) in TOPICS.into_iter().zip([1, 2]) {
-            let sample = OdometrySample {
-                stamp_ns: stamp_ns(p),
-                v_x_mps: p.v_x_mps,
-                v_y_mps: p.v_y_mps[model],
-                yaw_rate_radps: p.yaw_rate_radps[model],
-                ..OdometrySample::default()
-            };
-            writer.write(topic, sample.stamp_ns, &encode::odometry(&sample))?;
-        }
-        Ok(())
-    };
-    for message in bag.messages() {
-        let message = message?;
-        while let Some(p) = left.next_if(|p| stamp_ns(p) <= message.log_time.cast_signed()) {
-            write(&mut writer, p)?;
-        }
-        writer.copy(&message)?;
+    sequence: &StateSequence,
+    result: &Diagnosis,
+) -> anyhow::Result<String> {
+    if result.series.predictions.is_empty() {
+        return Ok("nothing: no model was fitted".to_owned());
     }
-    left.try_for_each(|p| write(&mut writer, p))?;
-    Ok(writer.finish()?)
+    let topic = report.streams.topic(Role::Odom);
+    let written = predictions::write(bag, topic, out, sequence, &result.series.predictions)?;
+    Ok(match written {
+        Written::WithPoses => out.display().to_string(),
+        Written::WithoutPoses => {
+            format!("{} (velocities only: no pose is recorded to begin at)", out.display())
+        }
+    })
 }
 
 fn outcome(result: &Diagnosis) -> Outcome {

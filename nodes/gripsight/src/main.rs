@@ -14,6 +14,8 @@ mod diagnose;
 mod friction;
 mod identify;
 mod invocation;
+mod outputs;
+mod predictions;
 mod simulate;
 mod withheld;
 

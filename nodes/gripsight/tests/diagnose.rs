@@ -3,10 +3,12 @@
 // Helpers outside of #[test] functions panic like tests do.
 #![allow(clippy::unwrap_used)]
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use gripsight_bag::Bag;
 use serde_json::Value;
 
 fn gripsight(folder: &Path, arguments: &str) -> (i32, String) {
@@ -23,20 +25,68 @@ fn json(path: &Path) -> Value {
     serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
 }
 
+/// Messages of each topic.
+fn messages(bag: &Path) -> BTreeMap<String, u64> {
+    let mut counts = BTreeMap::new();
+    for message in Bag::open(bag).unwrap().messages() {
+        *counts.entry(message.unwrap().channel.topic.clone()).or_default() += 1;
+    }
+    counts
+}
+
+#[test]
+fn a_recording_is_never_written_over_and_folders_are_looked_at_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    assert_eq!(gripsight(folder, "simulate --duration 1 --seed 1 --out a.mcap").0, 0);
+    fs::copy(folder.join("a.mcap"), folder.join("b.mcap")).unwrap();
+    fs::create_dir(folder.join("sub")).unwrap();
+    fs::write(folder.join("file"), "").unwrap();
+    std::os::unix::fs::symlink("a.mcap", folder.join("link.mcap")).unwrap();
+    std::os::unix::fs::symlink("../b.mcap", folder.join("sub/gap.json")).unwrap();
+    let before = fs::read(folder.join("a.mcap")).unwrap();
+    for (arguments, why) in [
+        ("a.mcap --out out --predictions a.mcap", "is a.mcap itself"),
+        ("link.mcap --out out --predictions sub/../a.mcap", "is link.mcap itself"),
+        ("a.mcap --out out --predictions link.mcap", "is a.mcap itself"),
+        ("a.mcap b.mcap --out out --predictions b.mcap", "is b.mcap itself"),
+        ("a.mcap --heldout b.mcap --out out --predictions b.mcap", "is b.mcap itself"),
+        ("a.mcap b.mcap --out sub", "is b.mcap itself"),
+        ("a.mcap --out file", "cannot make file"),
+        ("a.mcap --out out --predictions none/there.mcap", "cannot write none/there.mcap"),
+        ("a.mcap --out out --predictions sub", "there is a folder of that name"),
+    ] {
+        let (code, error) = gripsight(folder, &format!("diagnose {arguments}"));
+        assert!(code == 1 && error.contains(why), "{arguments}: {error}");
+    }
+    assert_eq!(fs::read(folder.join("a.mcap")).unwrap(), before);
+}
+
 #[test]
 fn diagnose_and_identify_take_the_extended_model_again() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let run = |arguments: &str| assert_eq!(gripsight(folder, arguments).0, 0, "{arguments}");
     run("simulate --effect steering_delay=0.03 --duration 20 --seed 62 --out laps.mcap");
-    run("diagnose laps.mcap --vehicle laps.vehicle.yaml --out first");
+    run("diagnose laps.mcap --vehicle laps.vehicle.yaml --out first --predictions first.mcap");
     assert_eq!(json(&folder.join("first/gap.json"))["effects"][0]["name"], "steering_delay");
 
+    // The recording once more, with the predictions of the first diagnosis in it.
     run(
-        "diagnose laps.mcap --vehicle laps.vehicle.yaml --extended-model first/extended_model.yaml --out second",
+        "diagnose first.mcap --vehicle laps.vehicle.yaml --extended-model first/extended_model.yaml --out second --predictions second.mcap",
     );
     let second = json(&folder.join("second/gap.json"));
     assert!(["no_gap", "tire_retune_only"].contains(&second["verdict"].as_str().unwrap()), "{second}");
+
+    let (recorded, first, second) =
+        (folder.join("laps.mcap"), folder.join("first.mcap"), folder.join("second.mcap"));
+    let predicted = messages(&first)["/gripsight/extended/odom"];
+    assert!(predicted > 1000, "{predicted}");
+    let mut expected = messages(&recorded);
+    for topic in ["/gripsight/nominal/odom", "/gripsight/extended/odom"] {
+        expected.insert(topic.to_owned(), predicted);
+    }
+    assert_eq!((messages(&first), messages(&second)), (expected.clone(), expected));
 
     run("identify laps.mcap --vehicle laps.vehicle.yaml --residual none --prior-mu 0.75 --out plain");
     run(

@@ -10,7 +10,7 @@ use gripsight_msgs::standard::sensor_msgs::Imu;
 use gripsight_signals::{DriveSample, ImuSample, Measurement, OdometrySample};
 
 use crate::effect::{Effect, Series};
-use crate::recover::refuse_same;
+use crate::recover::refuse_overwriting;
 use crate::{
     Bag, BagError, BagWriter, RawMessage, Role, Streams, TopicMap, decode, encode, from_cdr, to_cdr,
 };
@@ -23,7 +23,7 @@ use crate::{
 /// [`BagError`]; a truncated bag is refused, as is an effect on a stream that is not recorded, or a bag of recorded sequences.
 pub fn inject(bag: &Path, topics: &TopicMap, effects: &[Effect], out: &Path) -> Result<u64, BagError> {
     let bag = Bag::open(bag)?;
-    refuse_same(bag.files(), bag.path(), out)?;
+    refuse_overwriting(bag.path(), out)?;
     if let Some(topic) = topics.resolve_sequence(&bag)? {
         let why = format!("{topic} holds sequences that are cut already; inject into the recording itself");
         return Err(BagError::Effect {

@@ -31,7 +31,7 @@ pub use cdr::{from_cdr, to_cdr};
 pub use error::BagError;
 pub use info::{BagInfo, TopicInfo, Usable, info};
 pub use inject::inject;
-pub use recover::{Recovered, recover};
+pub use recover::{Recovered, recover, refuse_overwriting};
 pub use sequence::{
     CHUNK_LIMIT_BYTES, Reassembler, RecordedSequence, read_recorded_sequences, sequence_to_messages,
 };

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::bag::{Messages, check_profile};
+use crate::writer::part_of;
 use crate::{BagError, BagWriter, rosbag2};
 
 /// What [`recover`] found.
@@ -24,7 +25,7 @@ pub struct Recovered {
 /// [`BagError::Io`].
 pub fn recover(bag: &Path, out: &Path) -> Result<Recovered, BagError> {
     let files = rosbag2::files(bag)?;
-    refuse_same(&files, bag, out)?;
+    refuse_overwriting(bag, out)?;
     let mut writer = None;
     let mut recovered = Recovered::default();
     for file in files {
@@ -62,13 +63,23 @@ fn copy_whole(
     Ok(())
 }
 
-/// A bag is not written over itself.
-pub(crate) fn refuse_same(files: &[PathBuf], bag: &Path, out: &Path) -> Result<(), BagError> {
-    let canonical = out.canonicalize().ok();
-    let same = canonical.is_some()
-        && files.iter().map(PathBuf::as_path).chain([bag]).any(|p| p.canonicalize().ok() == canonical);
-    if same {
-        return Err(BagError::Write { path: out.to_owned(), why: "is the bag itself".to_owned() });
+/// Refuses to write a file where a bag that is read lies, by whatever path or link: the file itself, or one of a folder's.
+///
+/// # Errors
+/// [`BagError::Write`]; [`BagError::NotABag`], [`BagError::Io`] where `bag` is none.
+pub fn refuse_overwriting(bag: &Path, out: &Path) -> Result<(), BagError> {
+    let files = rosbag2::files(bag)?;
+    // A bag is written under another name at first.
+    for written in [out.to_owned(), part_of(out)] {
+        let canonical = written.canonicalize().ok();
+        let same =
+            files.iter().map(PathBuf::as_path).chain([bag]).any(|p| p.canonicalize().ok() == canonical);
+        if canonical.is_some() && same {
+            return Err(BagError::Write {
+                path: out.to_owned(),
+                why: format!("is {} itself", bag.display()),
+            });
+        }
     }
     Ok(())
 }

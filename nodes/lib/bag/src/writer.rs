@@ -53,7 +53,7 @@ impl BagWriter {
         let refuse = |why: &str| BagError::Write { path: path.to_owned(), why: why.to_owned() };
         let name =
             path.file_name().ok_or_else(|| refuse("no name for a bag"))?.to_string_lossy().into_owned();
-        let part = path.with_file_name(format!("{name}.part"));
+        let part = part_of(path);
         if path.is_dir() {
             return Err(refuse("there is a folder of that name, and folders are not overwritten"));
         }
@@ -195,6 +195,13 @@ impl BagWriter {
         }
         Ok(())
     }
+}
+
+/// Where a bag is written before it has its name.
+pub(crate) fn part_of(path: &Path) -> PathBuf {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(".part");
+    path.with_file_name(name)
 }
 
 /// Whether a path names a file rather than a rosbag2 folder.

@@ -203,6 +203,8 @@ pub struct Look {
 pub struct Prediction {
     /// Time since the recording's first sample.
     pub time_s: f64,
+    /// Whether a rollout begins here, from the best state.
+    pub begins: bool,
     /// Forward speed, which is the model's input.
     pub v_x_mps: f64,
     /// Lateral velocity: measured, of the nominal model, of the model with the effects.

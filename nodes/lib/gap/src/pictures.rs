@@ -88,6 +88,7 @@ fn predictions(
             let at = w.from + k;
             Prediction {
                 time_s: run.time_s(at),
+                begins: k == 0,
                 v_x_mps: run.v_x_mps[at],
                 v_y_mps: [run.measured[0][at], a[0], b[0]],
                 yaw_rate_radps: [run.measured[1][at], a[1], b[1]],

@@ -112,6 +112,7 @@ fn diagnosis() -> Diagnosis {
                 .map(|k| (k as f64 * 0.01, waves(k)))
                 .map(|(time_s, (v, r))| Prediction {
                     time_s,
+                    begins: false,
                     v_x_mps: 3.0,
                     v_y_mps: [v, 1.3 * v, 1.05 * v],
                     yaw_rate_radps: [r, 0.8 * r, 0.98 * r],
