@@ -7,7 +7,7 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use clap::Args;
 use gripsight_bag::{ReadReport, Role, TopicMap, read_sequences};
-use gripsight_gap::{Diagnosis, EffectId, ExtendedModelFile, Request, Verdict, diagnose};
+use gripsight_gap::{Diagnosis, Earlier, EffectId, ExtendedModelFile, Request, Verdict, diagnose};
 use gripsight_identification::export::{read_tires, stamp_text};
 use gripsight_identification::vehicle_hash;
 use gripsight_report::{GapInput, Header, gap_page};
@@ -93,37 +93,40 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     let vehicle = vehicle(args.vehicle.as_deref())?;
     let tires = args.pacejka.as_deref().map(tires).transpose()?;
     let model = args.extended_model.as_deref().map(extended_model).transpose()?;
-    // The drive that is explained is the later one; the earlier one says what the tires were.
+    // The drive that is explained is the later one, from the model of the earlier one.
     let subject = args.bag2.as_deref().unwrap_or(&args.bag);
     let (sequence, report) = read(subject, &topics)?;
-    let reference = args.bag2.as_ref().map(|_| read(&args.bag, &topics)).transpose()?;
+    let first = args.bag2.as_ref().map(|_| read(&args.bag, &topics)).transpose()?;
     let held_out = args.heldout.as_deref().map(|path| read(path, &topics)).transpose()?;
     let reading_s = start.elapsed().as_secs_f64();
     let spinner =
         ProgressBar::new_spinner().with_style(ProgressStyle::with_template("{spinner} {msg} {elapsed}")?);
-    let request = Request {
-        held_out: held_out.as_ref().map(|h| &h.0),
-        reference: reference.as_ref().map(|r| &r.0),
+    let mut progress = |stage: &str| {
+        spinner.set_message(stage.to_owned());
+        spinner.tick();
+        tracing::debug!("{stage}");
+    };
+    let alone = |sequence| Request {
         tires,
         model: model.as_ref(),
         without: &args.without,
         only: &args.only,
-        ..Request::new(&sequence, &vehicle)
+        ..Request::new(sequence, &vehicle)
     };
-    let result = diagnose(&request, &mut |stage| {
-        spinner.set_message(stage.to_owned());
-        spinner.tick();
-        tracing::debug!("{stage}");
-    })
-    .with_context(|| format!("cannot diagnose {}", subject.display()))?;
+    let earlier = first.as_ref().map(|first| Earlier::diagnosed(&alone(&first.0), &mut progress));
+    let earlier = earlier.transpose().with_context(|| format!("cannot diagnose {}", args.bag.display()))?;
+    let request =
+        Request { held_out: held_out.as_ref().map(|h| &h.0), earlier: earlier.as_ref(), ..alone(&sequence) };
+    let result = diagnose(&request, &mut progress)
+        .with_context(|| format!("cannot diagnose {}", subject.display()))?;
     spinner.finish_and_clear();
     let diagnosing_s = start.elapsed().as_secs_f64() - reading_s;
     let header = header(subject, &vehicle, &sequence);
-    let earlier = args.bag2.as_ref().map(|_| file_name(&args.bag));
+    let compared_with = args.bag2.as_ref().map(|_| file_name(&args.bag));
     let page = gap_page(&GapInput {
         diagnosis: &result,
         header: &header,
-        earlier: earlier.as_deref(),
+        earlier: compared_with.as_deref(),
         data_notes: &data_notes(&report),
     })?;
     let timing = Timing { reading_s, diagnosing_s, total_s: start.elapsed().as_secs_f64() };
@@ -137,8 +140,8 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         let path = args.out.join(name);
         fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
     }
-    if let Some(earlier) = earlier {
-        println!("compared   {} with {earlier}: what has changed since", file_name(subject));
+    if let Some(before) = compared_with {
+        println!("compared   {} with {before}: what has changed since", file_name(subject));
     }
     print!("{}", result.text());
     let names: Vec<&str> = files.iter().map(|f| f.0).collect();

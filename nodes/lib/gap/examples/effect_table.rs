@@ -17,7 +17,7 @@ use std::time::Instant;
 
 use anyhow::Context;
 use common::{drive_at, nominal};
-use gripsight_gap::{Diagnosis, EffectId, EffectParameter, Request, Verdict, diagnose};
+use gripsight_gap::{Diagnosis, Earlier, EffectId, EffectParameter, Request, Verdict, diagnose};
 use gripsight_reference_car::{CarParameters, effect_spec};
 use gripsight_signals::StateSequence;
 
@@ -67,8 +67,9 @@ fn main() -> anyhow::Result<()> {
     let vehicle = nominal(&car);
     let [reference, quiet] = SEEDS.map(|seed| drive_at(&car, &[], PACE, DURATION_S, seed));
     let (reference, quiet) = (reference?, quiet?);
+    let earlier = Earlier::diagnosed(&Request::new(&reference, &vehicle), &mut |_| {})?;
     let diagnosed = |recording: &StateSequence| {
-        let request = Request { reference: Some(&reference), ..Request::new(recording, &vehicle) };
+        let request = Request { earlier: Some(&earlier), ..Request::new(recording, &vehicle) };
         diagnose(&request, &mut |_| {})
     };
     let without = diagnosed(&quiet)?;

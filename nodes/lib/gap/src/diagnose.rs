@@ -17,7 +17,7 @@ use crate::trust::TireTrust;
 use crate::usable::{Usable, cannot_tell, refused, usable};
 use crate::verdict::{Remains, claims, decide, looks, rank};
 use crate::windows::{Windows, split};
-use crate::{ExtendedModelFile, GapError, noise, pictures, place};
+use crate::{Earlier, ExtendedModelFile, GapError, noise, pictures, place};
 
 /// What is diagnosed, and with what.
 #[derive(Debug, Clone)]
@@ -26,8 +26,8 @@ pub struct Request<'a> {
     pub sequence: &'a StateSequence,
     /// Another recording of the same car in the same state, to score on; else every fourth block of the first is held out.
     pub held_out: Option<&'a StateSequence>,
-    /// A drive from before: its tires are the reference that the recording is compared with.
-    pub reference: Option<&'a StateSequence>,
+    /// A drive from before, in place of `tires` and `model`: what has changed since is diagnosed.
+    pub earlier: Option<&'a Earlier>,
     /// The car as the model has it.
     pub vehicle: &'a VehicleParameters,
     /// The tires as the model has them, and trusted to a few percent; `None`: identified from the training blocks.
@@ -47,7 +47,7 @@ impl<'a> Request<'a> {
         Self {
             sequence,
             held_out: None,
-            reference: None,
+            earlier: None,
             vehicle,
             tires: None,
             model: None,
@@ -56,9 +56,14 @@ impl<'a> Request<'a> {
         }
     }
 
-    /// The tires handed over, if any.
+    /// The model to start from, if any.
+    fn given_model(&self) -> Option<&'a ExtendedModelFile> {
+        self.earlier.map(|earlier| &earlier.diagnosis.extended_model).or(self.model)
+    }
+
+    /// The tires to start from, if any.
     pub(crate) fn given_tires(&self) -> Option<PacejkaParameters> {
-        self.model.map(|m| m.tires).or(self.tires)
+        self.given_model().map(|m| m.tires).or(self.tires)
     }
 }
 
@@ -94,23 +99,15 @@ fn explain(
     let Usable { recording, windows } = usable;
     let other = request.held_out.map(|h| Recording::beside(h, Some(&recording))).transpose()?;
     progress("fitting the tires");
-    let earlier = match (request.given_tires(), request.reference) {
-        (None, Some(drive)) => Some(Earlier::of(drive, request.vehicle)?),
-        _ => None,
-    };
-    let (tires, trust) = match (request.given_tires(), &earlier) {
-        (Some(tires), _) => (tires, TireTrust::file()),
-        (None, Some(earlier)) => (earlier.state.tires(), TireTrust::drive()),
-        (None, None) => {
-            (first_fit(&recording, request.vehicle, &windows.training)?.tires(), TireTrust::free())
-        }
+    let (tires, trust) = match request.given_tires() {
+        Some(tires) if request.earlier.is_some() => (tires, TireTrust::drive()),
+        Some(tires) => (tires, TireTrust::file()),
+        None => (fit_tires(&recording, request.vehicle, &windows.training)?, TireTrust::free()),
     };
     let (library, invisible) = library(request, &recording, trust != TireTrust::free())?;
     let mut engine = Engine::new(&recording, request.vehicle, tires, trust);
-    if let Some(model) = request.model {
+    if let Some(model) = request.given_model() {
         (engine.held, engine.usual) = model.parameters()?;
-    } else if let Some(earlier) = &earlier {
-        engine.usual = engine.background(&earlier.state);
     }
     let nominal = engine.nominal_model();
     // The search works on a bounded number of windows, the final fit on all.
@@ -139,7 +136,7 @@ fn explain(
     let noise_is_known = noise::is_known(&recording);
     let scorer = Scorer::new(&engine, other.as_ref(), &windows);
     let drifts = drifts(&engine, &state, &windows.training, scorer.apart());
-    let norm = earlier.map_or_else(Left::default, |earlier| earlier.left(request.vehicle));
+    let norm = request.earlier.map(|earlier| earlier.left(request)).transpose()?.unwrap_or_default();
     let remains = Remains {
         norm: &norm,
         before: &before,
@@ -166,6 +163,7 @@ fn explain(
     let models = Models { nominal: &nominal, null: &null, state: &model, found: &state, others };
     let budget = Budget::of(&engine, &scorer, &windows, &models);
     let (verdict, mut reasons) = decide(&budget, &claims, &remains, &costs);
+    reasons.extend(request.earlier.map(|earlier| earlier.text()));
     reasons.extend(noise::caveat(&recording));
     let effects = rank(&engine, &claims, [&model, &state], blocks, others, &budget);
     let scored_windows =
@@ -213,36 +211,12 @@ fn explain(
     })
 }
 
-/// A drive from before, and the model that was fitted to it: the norm for what is the matter now.
-#[derive(Debug)]
-struct Earlier {
-    recording: Recording,
-    windows: Windows,
-    state: State,
-}
-
-impl Earlier {
-    fn of(drive: &StateSequence, vehicle: &VehicleParameters) -> Result<Self, GapError> {
-        let recording = Recording::new(drive)?;
-        let windows = split(&recording, false).training.thinned(SEARCH_WINDOWS);
-        let state = first_fit(&recording, vehicle, &windows)?;
-        Ok(Self { recording, windows, state })
-    }
-
-    /// What the model leaves of it.
-    fn left(&self, vehicle: &VehicleParameters) -> Left {
-        let engine = Engine::new(&self.recording, vehicle, self.state.tires(), TireTrust::free());
-        let slip_rad = large_slip_rad(&engine, &self.state, &self.windows);
-        Left::by(&engine, &self.state, &self.windows, slip_rad)
-    }
-}
-
-/// The best tires and background of a recording, with nothing known of them: from several starts, soft and stiff.
-fn first_fit(
+/// The best tires of a recording, with nothing known of them: from several starts, soft and stiff.
+fn fit_tires(
     recording: &Recording,
     vehicle: &VehicleParameters,
     windows: &Windows,
-) -> Result<State, GapError> {
+) -> Result<PacejkaParameters, GapError> {
     const FIRST: usize = 8;
     const REST: usize = 17;
     let windows = windows.thinned(SEARCH_WINDOWS);
@@ -258,7 +232,7 @@ fn first_fit(
         .min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
     let (engine, state) = best.ok_or(GapError::NotFinite)?;
     let state = engine.look(&[], &state.parameters, Some(state.starts), &windows, REST);
-    if state.finite { Ok(state) } else { Err(GapError::NotFinite) }
+    if state.finite { Ok(state.tires()) } else { Err(GapError::NotFinite) }
 }
 
 /// The effects to consider, and those that these signals cannot show.

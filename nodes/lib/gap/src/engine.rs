@@ -108,12 +108,6 @@ impl<'a> Engine<'a> {
         given.map(|(_, own)| own.as_slice())
     }
 
-    /// What a state has of the background.
-    pub(crate) fn background(&self, state: &State) -> Sized {
-        let background = BACKGROUND.into_iter().filter(|e| !state.named.contains(e));
-        background.filter_map(|e| Some((e, state.of(e)?.to_vec()))).collect()
-    }
-
     /// The parameters that stand for the effect's absence among the claims: those of the nominal model where it has the effect, else its null.
     pub(crate) fn absent(&self, effect: EffectId) -> Vec<f64> {
         self.given(effect).map_or_else(|| null_values(effect), <[f64]>::to_vec)
@@ -138,11 +132,13 @@ impl<'a> Engine<'a> {
         silent.chain(named.iter().copied()).collect()
     }
 
-    /// The parameters of a state, for a model that claims `named`; what the state lacks is absent.
+    /// The parameters of a state, for a model that claims `named`; what the state lacks is absent, and what is handed over and not claimed is as it
+    /// was handed over.
     pub(crate) fn carry(&self, state: &State, named: &[EffectId]) -> Vec<f64> {
         let mut values = state.parameters[..BASE].to_vec();
         for effect in self.layout(named) {
-            match state.of(effect) {
+            let is_fixed = self.holds(effect) && !named.contains(&effect);
+            match state.of(effect).filter(|_| !is_fixed) {
                 Some(own) => values.extend(own),
                 None => values.extend(self.absent(effect)),
             }

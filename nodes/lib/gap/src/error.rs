@@ -51,6 +51,9 @@ pub enum GapError {
         /// What was found.
         detail: String,
     },
+    /// The data of the drive that a later one is compared with cannot tell.
+    #[error("the drive before cannot be diagnosed: {0}")]
+    Earlier(String),
     /// A parameter file of an extended model cannot be read.
     #[error("extended model file: {0}")]
     ModelFile(String),

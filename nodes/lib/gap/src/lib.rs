@@ -60,6 +60,7 @@ mod budget;
 mod confidence;
 mod correct;
 mod diagnose;
+mod earlier;
 mod effects;
 mod engine;
 mod error;
@@ -95,6 +96,7 @@ mod windows;
 
 pub use correct::without_effects;
 pub use diagnose::{Request, diagnose};
+pub use earlier::Earlier;
 pub use effects::{Effect, EffectId, EffectSpec, Need, ParameterSpec, Reported};
 pub use error::GapError;
 pub use evaluate::Estimate;

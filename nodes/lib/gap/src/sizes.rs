@@ -86,7 +86,7 @@ pub(crate) fn is_told(
     let from = state.rows(effect).start;
     let sizing = effect.sizing();
     let away = |i: usize| own[i] - absent[i];
-    let held = |i: usize| state.is_held(from + i) && away(i).abs() > 1e-9;
+    let held = |i: usize| state.is_held(from + i) && away(i).abs() > 1e-9 && !state.is_gone(effect, from + i);
     let told = effect.is_of_a_place() || (0..sizing).any(|i| away(i).abs() > halves[i]);
     told && !is_misshapen(state, effect) && !(0..sizing).any(held)
 }

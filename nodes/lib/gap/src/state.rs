@@ -46,6 +46,12 @@ impl State {
         self.fit.as_ref().is_some_and(|f| f.on_bound.contains(&place))
     }
 
+    /// Whether a parameter of an effect is at its null, where bounds hold it too: that is a size like any other.
+    pub(crate) fn is_gone(&self, effect: EffectId, place: usize) -> bool {
+        let null = place.checked_sub(self.rows(effect).start).and_then(|i| effect.spec().parameters.get(i));
+        null.is_some_and(|p| (self.parameters[place] - p.null).abs() < 1e-9)
+    }
+
     pub(crate) fn tires(&self) -> PacejkaParameters {
         tires_from_parameters(&self.parameters[..TIRES])
     }

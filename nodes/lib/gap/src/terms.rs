@@ -19,6 +19,8 @@ pub struct Car<T> {
     pub cog_shift_m: T,
     /// Relaxation length of the tires; 0: none.
     pub relaxation_m: T,
+    /// Drag of the air over nominal mass and square of the speed.
+    pub drag_1pm: T,
     /// True forward speed over the reported one.
     pub speed_factor: T,
     /// Grip of the front and the rear axle, D of the Magic Formula.
@@ -40,6 +42,7 @@ impl<T: Real> Car<T> {
             l_r_m: T::from(vehicle.l_r_m),
             cog_shift_m: T::from(0.0),
             relaxation_m: T::from(0.0),
+            drag_1pm: T::from(0.0),
             speed_factor: T::from(1.0),
             peak,
             drive_front_share: vehicle.drive_front_share,

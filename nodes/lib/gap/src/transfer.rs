@@ -90,7 +90,7 @@ fn change(
     let mut parameters = engine.parameters(&state.named, &state.effects, &state.parameters, 1.0);
     for (j, p) in parameters.iter_mut().enumerate() {
         let moves = if rows.contains(&j) { sizing.contains(&j) } else { rest_moves };
-        p.free &= moves && !state.is_held(j);
+        p.free &= moves && (!state.is_held(j) || state.is_gone(effect, j));
         // Data may ask for any size; the rest stays near what it was fitted to.
         p.prior = p.prior.filter(|_| !rows.contains(&j)).map(|prior| Prior { mean: p.start, ..prior });
     }

@@ -25,14 +25,16 @@ pub(super) struct LongitudinalLoadTransfer;
 impl Effect for LongitudinalLoadTransfer {
     const SPEC: EffectSpec = spec(
         "longitudinal_load_transfer",
-        "F_zf -= m a_x h/L, F_zr += m a_x h/L",
+        "F_zf -= (m a_x + drag) h/L, F_zr += (m a_x + drag) h/L",
         "moment balance in pitch",
         "trail braking, power in the corner",
         &[positive("h_m", "m", [0.06, 0.3])],
     );
 
     fn loads<T: Real>(p: &[T], car: &Car<T>, at: &Moment<T>, axles: &mut Axles<T>) {
-        let moved_n = p[0] * car.mass_kg * at.a_x_mps2 / car.wheelbase_m();
+        // Only forces on the tires have a lever: drag acts near the centre of gravity, and the tires push against it.
+        let drag_n = car.drag_1pm * at.v_x_mps * at.v_x_mps * car.nominal_mass_kg;
+        let moved_n = p[0] * (car.mass_kg * at.a_x_mps2 + drag_n) / car.wheelbase_m();
         add(car, axles, -moved_n, moved_n);
     }
 }

@@ -23,6 +23,10 @@ impl Effect for AeroDrag {
         )
     };
 
+    fn car<T: Real>(p: &[T], car: &mut Car<T>) {
+        car.drag_1pm = p[0];
+    }
+
     fn motion<T: Real>(p: &[T], car: &Car<T>, at: &Moment<T>, motion: &mut Motion<T>) {
         motion.force_x_mps2 -= p[0] * at.v_x_mps * at.v_x_mps * car.nominal_mass_kg / car.mass_kg;
     }
