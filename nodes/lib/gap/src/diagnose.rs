@@ -15,9 +15,9 @@ use crate::state::State;
 use crate::transfer::drifts;
 use crate::trust::TireTrust;
 use crate::usable::{Usable, cannot_tell, refused, usable};
-use crate::verdict::{Remains, claims, decide, looks, rank};
+use crate::verdict::{Remains, claims, decide, drive_next, looks, rank, record_next};
 use crate::windows::{Windows, split};
-use crate::{Earlier, ExtendedModelFile, GapError, noise, pictures, place};
+use crate::{Earlier, ExtendedModelFile, GapError, noise, pictures, place, plausible};
 
 /// What is diagnosed, and with what.
 #[derive(Debug, Clone)]
@@ -163,6 +163,8 @@ fn explain(
     let models = Models { nominal: &nominal, null: &null, state: &model, found: &state, others };
     let budget = Budget::of(&engine, &scorer, &windows, &models);
     let (verdict, mut reasons) = decide(&budget, &claims, &remains, &costs);
+    // What cannot be right comes right after the errors: it explains more than any effect.
+    reasons.splice(1..1, plausible::doubts(&recording, request.vehicle));
     reasons.extend(request.earlier.map(|earlier| earlier.text()));
     reasons.extend(noise::caveat(&recording));
     let effects = rank(&engine, &claims, [&model, &state], blocks, others, &budget);
@@ -188,7 +190,7 @@ fn explain(
     Ok(Diagnosis {
         verdict,
         reasons,
-        drive_next: crate::verdict::drive_next(&effects),
+        drive_next: [drive_next(&effects), record_next(verdict, &invisible)].concat(),
         effects,
         invisible,
         detection_limits,
@@ -260,7 +262,9 @@ fn library(
             continue;
         }
         match effect.spec().needs.iter().find(|n| !met(**n)) {
-            Some(need) => invisible.push(Invisible { name: effect.name(), reason: need.reason().to_owned() }),
+            Some(&need) => {
+                invisible.push(Invisible { name: effect.name(), reason: need.reason().to_owned(), need });
+            }
             None => library.push(effect),
         }
     }

@@ -74,6 +74,7 @@ mod noise;
 mod outcome;
 mod pictures;
 mod place;
+mod plausible;
 mod priors;
 mod recording;
 mod refit;

@@ -6,7 +6,7 @@ use gripsight_signals::DataHealth;
 use gripsight_vehicle::PacejkaParameters;
 use serde::Serialize;
 
-use crate::{Estimate, ExtendedModelFile, Identity};
+use crate::{Estimate, ExtendedModelFile, Identity, Need};
 
 /// What a diagnosis comes to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -76,6 +76,9 @@ pub struct RankedEffect {
 /// An effect that these signals cannot show.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Invisible {
+    /// What is missing.
+    #[serde(skip)]
+    pub need: Need,
     /// Canonical name.
     pub name: &'static str,
     /// Why.

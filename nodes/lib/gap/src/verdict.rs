@@ -2,10 +2,10 @@
 
 use crate::budget::Budget;
 use crate::confidence::{LEAST_CHANCE, Signs};
-use crate::effects::EffectId;
+use crate::effects::{EffectId, Need};
 use crate::engine::Engine;
 use crate::evaluate::mean;
-use crate::outcome::{Comparison, Look, RankedEffect, Verdict};
+use crate::outcome::{Comparison, Invisible, Look, RankedEffect, Verdict};
 use crate::rooms::Left;
 use crate::select::{Round, thresholds};
 use crate::sizes::{is_told, sizes};
@@ -171,8 +171,9 @@ pub(crate) fn decide(
         return (Verdict::NoneOfThese, reasons);
     }
     reasons.push(
-        "what is left after retuning the tires is within noise and the usual imperfection of the model"
-            .to_owned(),
+        format!(
+            "what is left after retuning the tires, {retuned:.1} times the noise, is what this model leaves of any such drive"
+        ),
     );
     let retune = nominal - retuned > RETUNE_EXCESS;
     (if retune { Verdict::TireRetuneOnly } else { Verdict::NoGap }, reasons)
@@ -276,6 +277,24 @@ fn confused(round: &Round, effect: EffectId) -> Vec<EffectId> {
         })
         .map(|(r, _)| r.effect)
         .collect()
+}
+
+/// What would have to be recorded to see what these signals cannot show, where something is to be explained.
+pub(crate) fn record_next(verdict: Verdict, invisible: &[Invisible]) -> Vec<String> {
+    let mut needs: Vec<Need> = invisible.iter().map(|i| i.need).collect();
+    needs.sort_unstable();
+    needs.dedup();
+    // Other tires are what a change of grip looks like; all else is of no use where nothing is left.
+    needs.retain(|need| match verdict {
+        Verdict::NoGap => false,
+        Verdict::TireRetuneOnly => *need == Need::ReferenceTires,
+        _ => true,
+    });
+    let line = |need: Need| {
+        let names: Vec<&str> = invisible.iter().filter(|i| i.need == need).map(|i| i.name).collect();
+        format!("to see {}: {}", names.join(", "), need.remedy())
+    };
+    needs.into_iter().map(line).collect()
 }
 
 /// What would split the groups and sharpen what was not seen.

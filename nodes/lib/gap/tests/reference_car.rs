@@ -4,8 +4,8 @@
 
 mod common;
 
-use common::{drive, nominal};
-use gripsight_gap::{Diagnosis, GapError, Request, Verdict, diagnose};
+use common::{drive, drive_at, nominal};
+use gripsight_gap::{Diagnosis, Earlier, GapError, Request, Verdict, diagnose};
 use gripsight_reference_car::CarParameters;
 use gripsight_signals::StateSequence;
 
@@ -129,4 +129,27 @@ fn one_lap_hides_what_needs_a_second() {
     let patch = d.invisible.iter().find(|i| i.name == "low_grip_patch").unwrap();
     assert!(patch.reason.contains("lap") || patch.reason.contains("pass"), "{}", patch.reason);
     assert!(d.effects.iter().all(|e| e.name != "low_grip_patch"));
+}
+
+#[test]
+fn of_two_drives_only_what_has_changed_is_told() {
+    const DELAY: &str = "steering_delay=0.04";
+    let small = CarParameters::by_name("f1tenth").unwrap();
+    let vehicle = nominal(&small);
+    let [late, late_too, prompt] = [(DELAY, 26), (DELAY, 27), ("", 28)].map(|(effect, seed)| {
+        let effects: Vec<&str> = Some(effect).filter(|e| !e.is_empty()).into_iter().collect();
+        drive_at(&small, &effects, 0.8, DURATION_S, seed).unwrap()
+    });
+    let earlier = Earlier::diagnosed(&Request::new(&late, &vehicle), &mut |_| {}).unwrap();
+    assert_eq!(named(&earlier.diagnosis), ["steering_delay"], "{}", earlier.diagnosis.text());
+    let since = |recording: &StateSequence| {
+        let request = Request { earlier: Some(&earlier), ..Request::new(recording, &vehicle) };
+        diagnose(&request, &mut |_| {}).unwrap()
+    };
+    let same = since(&late_too);
+    assert!(matches!(same.verdict, Verdict::NoGap | Verdict::TireRetuneOnly), "{}", same.text());
+    let gone = since(&prompt);
+    assert_eq!(named(&gone), ["steering_delay"], "{}", gone.text());
+    let delay_s = gone.effects[0].parameters["delay_s"].clone();
+    assert!(delay_s.low <= 0.0 && delay_s.high < 0.01 && delay_s.before.unwrap() > 0.035, "{delay_s:?}");
 }

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use gripsight_gap::{
-    Diagnosis, EffectParameter, Estimate, ExtendedModelFile, GapBudget, Identity, Invisible, Place,
+    Diagnosis, EffectParameter, Estimate, ExtendedModelFile, GapBudget, Identity, Invisible, Need, Place,
     Prediction, RankedEffect, Series, TirePair, Unexplained, Verdict, Where,
 };
 use gripsight_report::{GapInput, Header, gap_page};
@@ -54,7 +54,11 @@ fn diagnosis() -> Diagnosis {
             effect("steering_delay", true, "delay_s", 0.047, "s"),
             effect("tire_relaxation", false, "sigma_m", 0.08, "m"),
         ],
-        invisible: vec![Invisible { name: "aero_drag", reason: "needs a longitudinal command".into() }],
+        invisible: vec![Invisible {
+            need: Need::LongitudinalCommand,
+            name: "aero_drag",
+            reason: "needs a longitudinal command".into(),
+        }],
         detection_limits: Vec::new(),
         places: Where {
             channel: vec![Place {

@@ -43,6 +43,19 @@ pub enum Need {
 }
 
 impl Need {
+    /// What to do about it.
+    #[must_use]
+    pub fn remedy(self) -> &'static str {
+        match self {
+            Self::LongitudinalCommand => "record the commanded acceleration along with the steering",
+            Self::Accelerometer => "record an inertial unit's accelerations",
+            Self::Passes => "record a pose and drive two laps or more, or hold out a second drive",
+            Self::ReferenceTires => {
+                "give the tires of an earlier drive (--pacejka), or that drive as the first bag"
+            }
+        }
+    }
+
     /// In words, as a reason why an effect is invisible.
     #[must_use]
     pub fn reason(self) -> &'static str {
