@@ -6,11 +6,12 @@ use std::time::Instant;
 
 use anyhow::{Context, bail};
 use clap::Args;
+use clap::builder::PossibleValuesParser;
 use gripsight_bag::{ReadReport, Role, TopicMap, read_sequences};
 use gripsight_gap::{Diagnosis, Earlier, EffectId, ExtendedModelFile, Request, Verdict, diagnose};
 use gripsight_identification::export::{read_tires, stamp_text};
 use gripsight_identification::vehicle_hash;
-use gripsight_report::{GapInput, Header, gap_page};
+use gripsight_report::{GapInput, Header, gap_page, gap_text};
 use gripsight_signals::{StateSequence, WindowConfig};
 use gripsight_vehicle::VehicleParameters;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -47,10 +48,10 @@ pub(crate) struct DiagnoseArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["bag2", "pacejka"])]
     extended_model: Option<PathBuf>,
     /// Leave an effect out of the library. May be repeated.
-    #[arg(long, value_name = "EFFECT")]
+    #[arg(long, value_name = "EFFECT", value_parser = effects(), hide_possible_values = true)]
     without: Vec<String>,
     /// Consider only this effect. May be repeated.
-    #[arg(long, value_name = "EFFECT", conflicts_with = "without")]
+    #[arg(long, value_name = "EFFECT", value_parser = effects(), hide_possible_values = true, conflicts_with = "without")]
     only: Vec<String>,
     /// A file that maps names to topics, such as `odom: /car_state/odom`; without it topics are found by type.
     #[arg(long, value_name = "FILE")]
@@ -62,6 +63,10 @@ pub(crate) struct DiagnoseArgs {
     /// /gripsight/extended/odom of the model with the effects found (open-loop rollouts of half a second, each from the recorded pose on).
     #[arg(long, value_name = "BAG")]
     predictions: Option<PathBuf>,
+}
+
+fn effects() -> PossibleValuesParser {
+    PossibleValuesParser::new(EffectId::ALL.iter().map(|e| e.name()))
 }
 
 fn names() -> String {
@@ -123,11 +128,12 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     let diagnosing_s = start.elapsed().as_secs_f64() - reading_s;
     let header = header(subject, &vehicle, &sequence);
     let compared_with = args.bag2.as_ref().map(|_| file_name(&args.bag));
+    let notes = data_notes(&report);
     let page = gap_page(&GapInput {
         diagnosis: &result,
         header: &header,
         earlier: compared_with.as_deref(),
-        data_notes: &data_notes(&report),
+        data_notes: &notes,
     })?;
     let timing = Timing { reading_s, diagnosing_s, total_s: start.elapsed().as_secs_f64() };
     let texts =
@@ -140,10 +146,10 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         let path = args.out.join(name);
         fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
     }
-    if let Some(before) = compared_with {
-        println!("compared   {} with {before}: what has changed since", file_name(subject));
+    if let Some(before) = &compared_with {
+        println!("compared   {} with {before}", file_name(subject));
     }
-    print!("{}", result.text());
+    print!("{}", gap_text(&result, compared_with.as_deref(), &notes));
     let names: Vec<&str> = files.iter().map(|f| f.0).collect();
     println!("files      {} ({})", args.out.display(), names.join(", "));
     if let Some(path) = &args.predictions {

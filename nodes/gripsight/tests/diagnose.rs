@@ -63,6 +63,16 @@ fn a_recording_is_never_written_over_and_folders_are_looked_at_first() {
 }
 
 #[test]
+fn an_effect_that_is_not_in_the_library_is_wrong_usage() {
+    let folder = tempfile::tempdir().unwrap();
+    for option in ["--without", "--only"] {
+        let (code, error) =
+            gripsight(folder.path(), &format!("diagnose none.mcap --out out {option} steering_dealy"));
+        assert!(code == 2 && error.contains("a similar value exists: 'steering_delay'"), "{error}");
+    }
+}
+
+#[test]
 fn diagnose_and_identify_take_the_extended_model_again() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

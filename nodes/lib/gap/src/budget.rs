@@ -7,7 +7,7 @@ use crate::engine::Engine;
 use crate::evaluate::{Estimate, bootstrap, by_block, interval, mean, of_picked};
 use crate::flexible::{Flexible, Room};
 use crate::model::ExtendedModel;
-use crate::outcome::GapBudget;
+use crate::outcome::{GapBudget, GapStep};
 use crate::recording::Recording;
 use crate::residual::Residual;
 use crate::select::Round;
@@ -20,6 +20,8 @@ pub(crate) struct Budget {
     pub(crate) nominal: Vec<(f64, f64)>,
     /// Retuned tires, then with one effect after the other.
     pub(crate) steps: Vec<Vec<(f64, f64)>>,
+    /// Those effects.
+    named: Vec<EffectId>,
     pub(crate) ceiling: Vec<(f64, f64)>,
     /// Retuned tires and a residual network; nothing where it could not be trained.
     residual: Option<Vec<(f64, f64)>>,
@@ -149,6 +151,7 @@ impl Budget {
             ceiling: blocks(&state.effects, Some(&flexible), &ceiling),
             residual,
             steps,
+            named: state.named.clone(),
             // By construction of the noise's figure the floor is 1.
             floor: Estimate { value: 1.0, low: 1.0, high: 1.0 },
             closed: whole,
@@ -189,9 +192,11 @@ impl Budget {
             .collect();
         let after = self.steps.last().map_or(Estimate::UNKNOWN, |b| interval(b));
         let ceiling = interval(&self.ceiling);
+        let steps = self.named.iter().zip(self.steps.iter().skip(1));
         GapBudget {
             nominal: interval(&self.nominal),
             retuned: self.steps.first().map_or(Estimate::UNKNOWN, |b| interval(b)),
+            steps: steps.map(|(e, blocks)| GapStep { effect: e.name(), error: interval(blocks) }).collect(),
             after,
             unstructured_ceiling: if ceiling.value > after.value { after } else { ceiling },
             s4_residual: self.residual.as_deref().map_or(Estimate::UNKNOWN, interval),

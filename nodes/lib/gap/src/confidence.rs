@@ -83,6 +83,8 @@ impl Signs {
         const USUAL: f64 = 0.02;
         const STEP: f64 = 0.03;
         const MOST_STEPS: f64 = 3.0;
+        /// A share above that is told in words.
+        const MANY_TIMES: f64 = 10.0;
         let steps = ((self.left_in_its_room - USUAL) / STEP).clamp(0.0, MOST_STEPS);
         let untried = if self.untried > 0 { steps } else { 0.0 };
         let share = self.left / self.explained.max(LEAST_EXPLAINED);
@@ -90,7 +92,11 @@ impl Signs {
         [
             Doubt {
                 odds: PER_LOG_SHARE * (share / LEAST_SHARE).ln_1p(),
-                text: format!("free terms would explain {} % of what it explains", percent(share)),
+                text: if share > MANY_TIMES {
+                    "free terms would explain many times what it explains".to_owned()
+                } else {
+                    format!("free terms would explain {} % of what it explains", percent(share))
+                },
             },
             Doubt {
                 odds: PER_LOG_DRIFT * (self.drift / LEAST_DRIFT).ln_1p(),

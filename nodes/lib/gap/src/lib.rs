@@ -88,7 +88,6 @@ mod smooth;
 mod state;
 mod station;
 mod terms;
-mod text;
 mod transfer;
 mod trust;
 mod usable;
@@ -104,8 +103,8 @@ pub use evaluate::Estimate;
 pub use extended_file::ExtendedModelFile;
 pub use identities::Identity;
 pub use outcome::{
-    Comparison, DetectionLimit, Diagnosis, EffectParameter, GapBudget, Invisible, Look, Place, Prediction,
-    RankedEffect, Series, TirePair, Unexplained, Verdict, Where,
+    Comparison, DetectionLimit, Diagnosis, EffectParameter, GapBudget, GapStep, Invisible, Look, Place,
+    Prediction, RankedEffect, Series, TirePair, Unexplained, Verdict, Where,
 };
 pub use recording::{Channel, Recording};
 pub use terms::{Axle, Axles, Car, Moment, Motion, Outputs};

@@ -138,6 +138,15 @@ pub struct Where {
     pub time: Vec<Place>,
 }
 
+/// The error with one more of the named effects in the model.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct GapStep {
+    /// Canonical name of the effect that is new.
+    pub effect: &'static str,
+    /// Mean squared error over the noise variance, as in [`GapBudget`].
+    pub error: Estimate,
+}
+
 /// The gap step by step: mean squared error of open-loop rollouts on held-out data over the noise variance.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GapBudget {
@@ -145,7 +154,9 @@ pub struct GapBudget {
     pub nominal: Estimate,
     /// With the tires retuned.
     pub retuned: Estimate,
-    /// With the named effects.
+    /// With the tires retuned and one named effect after the other, in the order of the ranking; empty where none is named.
+    pub steps: Vec<GapStep>,
+    /// With all the named effects: the last of the steps, or the same as `retuned`.
     pub after: Estimate,
     /// With flexible terms on top.
     pub unstructured_ceiling: Estimate,

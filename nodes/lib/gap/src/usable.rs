@@ -70,6 +70,7 @@ pub(crate) fn refused(request: &Request<'_>, error: &GapError, data_health: Data
         gap: GapBudget {
             nominal: unknown,
             retuned: unknown,
+            steps: Vec::new(),
             after: unknown,
             unstructured_ceiling: unknown,
             s4_residual: unknown,

@@ -52,7 +52,7 @@ impl Windows {
 
     /// Time covered.
     pub(crate) fn duration_s(&self, dt_s: f64) -> f64 {
-        self.windows.iter().map(|w| w.len as f64 * dt_s).sum()
+        self.windows.iter().map(|w| w.len).sum::<usize>() as f64 * dt_s
     }
 }
 

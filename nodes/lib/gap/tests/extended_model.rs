@@ -6,7 +6,7 @@ mod common;
 
 use std::collections::BTreeMap;
 
-use common::{drive, nominal};
+use common::{drive, nominal, text};
 use gripsight_gap::{Diagnosis, ExtendedModelFile, Request, Verdict, diagnose, without_effects};
 use gripsight_reference_car::CarParameters;
 use gripsight_signals::StateSequence;
@@ -28,13 +28,13 @@ fn named(d: &Diagnosis) -> Vec<&'static str> {
 fn a_drive_has_no_gap_to_its_own_extended_model_and_a_later_change_is_found_on_top() {
     let recording = drive(&car(), &["steering_delay=0.03"], 30.0, 26).unwrap();
     let first = from_model(&recording, None);
-    assert_eq!(named(&first), ["steering_delay"], "{}", first.text());
+    assert_eq!(named(&first), ["steering_delay"], "{}", text(&first));
     // By way of the file.
     let model = ExtendedModelFile::from_yaml(&first.extended_model.to_yaml().unwrap()).unwrap();
     assert_eq!(model, first.extended_model);
 
     let second = from_model(&recording, Some(&model));
-    assert!(matches!(second.verdict, Verdict::NoGap | Verdict::TireRetuneOnly), "{}", second.text());
+    assert!(matches!(second.verdict, Verdict::NoGap | Verdict::TireRetuneOnly), "{}", text(&second));
     assert_eq!(named(&second), Vec::<&str>::new());
     // It starts where the first ended, and what it hands on still has the delay.
     let (start, end) = (second.gap.nominal.value, first.gap.after.value);
@@ -44,7 +44,7 @@ fn a_drive_has_no_gap_to_its_own_extended_model_and_a_later_change_is_found_on_t
 
     let changed = drive(&car(), &["steering_delay=0.03", "v_y_bias=0.2"], 22.0, 27).unwrap();
     let third = from_model(&changed, Some(&model));
-    assert_eq!(named(&third), ["v_y_bias"], "{}", third.text());
+    assert_eq!(named(&third), ["v_y_bias"], "{}", text(&third));
     assert_eq!(delay_s(&third.extended_model), delay_s(&model));
 }
 

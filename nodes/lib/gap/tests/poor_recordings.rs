@@ -8,7 +8,7 @@ mod poor;
 
 use std::sync::OnceLock;
 
-use common::{drive, nominal};
+use common::{drive, nominal, text};
 use gripsight_gap::{Diagnosis, GapError, Request, Verdict, diagnose};
 use gripsight_reference_car::CarParameters;
 use gripsight_signals::StateSequence;
@@ -36,17 +36,17 @@ fn answer(sequence: &StateSequence) -> Result<Diagnosis, GapError> {
 
 /// The bias leads the ranking with its size inside. So little data may leave it a candidate, and the verdict open.
 fn finds_the_bias(d: &Diagnosis) {
-    assert_eq!(d.effects[0].name, "v_y_bias", "{}", d.text());
+    assert_eq!(d.effects[0].name, "v_y_bias", "{}", text(d));
     let bias = &d.effects[0].parameters["bias_mps"];
     assert!(bias.low < BIAS_MPS && BIAS_MPS < bias.high, "{bias:?}");
-    assert!(d.effects[0].accepted || d.verdict == Verdict::NoneOfThese, "{}", d.text());
+    assert!(d.effects[0].accepted || d.verdict == Verdict::NoneOfThese, "{}", text(d));
 }
 
 #[test]
 fn ten_seconds_are_scored_on_what_was_fitted_and_say_so() {
     let d = answer(&picked(|_, t| t < 10.0)).unwrap();
     assert!(d.gap.scored_on.contains("too little data to hold any out"), "{}", d.gap.scored_on);
-    assert!(d.text().contains("too little data to hold any out"));
+    assert!(text(&d).contains("too little data to hold any out"));
     let closed = d.gap_closed_fraction;
     let named = d.verdict == Verdict::Effects;
     assert!(if named { closed.low < closed.value || closed.value.is_nan() } else { closed.value == 0.0 });
@@ -63,7 +63,7 @@ fn twenty_hertz_are_enough_for_a_bias() {
 fn a_gap_is_stated_and_not_bridged() {
     let d = answer(&picked(|_, t| !(8.0..11.0).contains(&t))).unwrap();
     assert_eq!(d.data_health.gaps.len(), 1);
-    assert!(d.text().contains("1 gaps"));
+    assert!(text(&d).contains("1 gaps"));
     let inside = |p: &&gripsight_gap::Prediction| (8.1..10.9).contains(&p.time_s);
     assert_eq!(d.series.predictions.iter().filter(inside).count(), 0);
     finds_the_bias(&d);

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{drive, drive_at, nominal};
+use common::{drive, drive_at, nominal, text};
 use gripsight_gap::{Diagnosis, Earlier, GapError, Request, Verdict, diagnose};
 use gripsight_reference_car::CarParameters;
 use gripsight_signals::StateSequence;
@@ -29,10 +29,10 @@ fn named(d: &Diagnosis) -> Vec<&'static str> {
 fn a_clear_effect_is_named_with_its_size_and_closes_the_gap() {
     let recording = drive(&car(), &["tire_relaxation=0.45"], DURATION_S, 21).unwrap();
     let d = diagnosed(&recording, &[]);
-    assert_eq!((d.verdict, named(&d)[0]), (Verdict::Effects, "tire_relaxation"), "{}", d.text());
+    assert_eq!((d.verdict, named(&d)[0]), (Verdict::Effects, "tire_relaxation"), "{}", text(&d));
     let sigma_m = d.effects[0].parameters["sigma_m"].value;
     assert!((sigma_m - 0.45).abs() < 0.05, "sigma {sigma_m} m, true 0.45 m");
-    assert!(d.gap_closed_fraction.value > 0.7, "{}", d.text());
+    assert!(d.gap_closed_fraction.value > 0.7, "{}", text(&d));
     assert!(d.gap.noise_floor.value <= d.gap.after.value && d.gap.after.value < d.gap.retuned.value);
     assert!(d.gap.unstructured_ceiling.value <= d.gap.after.value);
 
@@ -45,12 +45,12 @@ fn a_clear_effect_is_named_with_its_size_and_closes_the_gap() {
 fn without_an_effect_nothing_is_named() {
     let recording = drive(&car(), &[], DURATION_S, 22).unwrap();
     let d = diagnosed(&recording, &[]);
-    assert!(matches!(d.verdict, Verdict::NoGap | Verdict::TireRetuneOnly), "{}", d.text());
+    assert!(matches!(d.verdict, Verdict::NoGap | Verdict::TireRetuneOnly), "{}", text(&d));
     assert_eq!(named(&d), Vec::<&str>::new());
     // No figure speaks of a candidate, and none is listed that is not there at all.
     assert_eq!((d.gap.after, d.tires.with_effect), (d.gap.retuned, d.tires.without_effect));
     assert_eq!(d.gap_closed_fraction.value, 0.0);
-    assert!(d.effects.iter().all(|e| e.parameters.values().all(|p| p.value.is_finite())), "{}", d.text());
+    assert!(d.effects.iter().all(|e| e.parameters.values().all(|p| p.value.is_finite())), "{}", text(&d));
 }
 
 #[test]
@@ -111,7 +111,7 @@ fn data_that_cannot_tell_get_that_verdict_and_malformed_data_an_error() {
         let d = answer(&sequence).unwrap();
         assert_eq!(d.verdict, Verdict::NotIdentifiable, "{name}");
         assert!(d.reasons[0].contains(reason), "{name}: {}", d.reasons[0]);
-        assert!(d.text().contains(reason) && !d.drive_next.is_empty(), "{name}");
+        assert!(text(&d).contains(reason) && !d.drive_next.is_empty(), "{name}");
         let json: serde_json::Value = serde_json::to_value(&d).unwrap();
         assert_eq!(json["verdict"], "not_identifiable", "{name}");
         assert!(json["gap"]["nominal"]["value"].is_null(), "{name}");
@@ -141,15 +141,15 @@ fn of_two_drives_only_what_has_changed_is_told() {
         drive_at(&small, &effects, 0.8, DURATION_S, seed).unwrap()
     });
     let earlier = Earlier::diagnosed(&Request::new(&late, &vehicle), &mut |_| {}).unwrap();
-    assert_eq!(named(&earlier.diagnosis), ["steering_delay"], "{}", earlier.diagnosis.text());
+    assert_eq!(named(&earlier.diagnosis), ["steering_delay"], "{}", text(&earlier.diagnosis));
     let since = |recording: &StateSequence| {
         let request = Request { earlier: Some(&earlier), ..Request::new(recording, &vehicle) };
         diagnose(&request, &mut |_| {}).unwrap()
     };
     let same = since(&late_too);
-    assert!(matches!(same.verdict, Verdict::NoGap | Verdict::TireRetuneOnly), "{}", same.text());
+    assert!(matches!(same.verdict, Verdict::NoGap | Verdict::TireRetuneOnly), "{}", text(&same));
     let gone = since(&prompt);
-    assert_eq!(named(&gone), ["steering_delay"], "{}", gone.text());
+    assert_eq!(named(&gone), ["steering_delay"], "{}", text(&gone));
     let delay_s = gone.effects[0].parameters["delay_s"].clone();
     assert!(delay_s.low <= 0.0 && delay_s.high < 0.01 && delay_s.before.unwrap() > 0.035, "{delay_s:?}");
 }

@@ -3,7 +3,7 @@
 //! A page is one HTML file without scripts or references: it opens from a USB stick and prints on two sheets. Pictures are SVG
 //! inside it. Colours have fixed [`Role`]s in every picture.
 //!
-//! [`identification_page`] shows the result of an identification, [`gap_page`] that of a diagnosis,
+//! [`identification_page`] shows the result of an identification, [`gap_page`] that of a diagnosis ([`gap_text`] says the same on a terminal),
 //! [`withheld_page`] the score of the blind check. They are built of [`Chart`]s,
 //! bars and tables; nothing here computes what is not only for the eye.
 
@@ -20,7 +20,7 @@ mod withheld;
 
 pub use chart::{Axis, Chart, Layer};
 pub use error::ReportError;
-pub use gap::{GapInput, gap_page};
+pub use gap::{GapInput, gap_page, gap_text};
 pub use identification::{IdentificationInput, identification_page};
 pub use page::Header;
 pub use role::Role;

@@ -57,8 +57,14 @@ pub fn with_interval(value: f64, low: f64, high: f64) -> (String, String) {
 /// An estimate with its interval behind it.
 #[must_use]
 pub fn estimate(e: &Estimate) -> String {
-    let (value, interval) = with_interval(e.value, e.low, e.high);
-    format!("{value} ({interval})")
+    estimate_of(e.value, e.low, e.high)
+}
+
+/// A value with its interval behind it, where it has one.
+#[must_use]
+pub fn estimate_of(value: f64, low: f64, high: f64) -> String {
+    let (text, range) = with_interval(value, low, high);
+    if low == high { text } else { format!("{text} ({range})") }
 }
 
 /// Peak friction with its interval, or what stands in its place.
@@ -91,8 +97,19 @@ pub fn percent_interval(low: f64, high: f64) -> String {
     if !(low.is_finite() && high.is_finite()) {
         return NOTHING.into();
     }
-    let decimals = usize::from(high - low < 0.02);
+    let decimals = share_decimals(low, high);
     format!("{} … {} %", fixed(100.0 * low, decimals), fixed(100.0 * high, decimals))
+}
+
+/// A share with its interval behind it, both with the decimals of [`percent_interval`].
+#[must_use]
+pub fn percent_estimate(share: f64, low: f64, high: f64) -> String {
+    let decimals = share_decimals(low, high);
+    format!("{} % ({})", fixed(100.0 * share, decimals), percent_interval(low, high))
+}
+
+fn share_decimals(low: f64, high: f64) -> usize {
+    usize::from(high - low < 0.02)
 }
 
 #[cfg(test)]
@@ -126,5 +143,6 @@ mod tests {
         assert_eq!(percent_interval(0.955_4, 0.961_8), "95.5 … 96.2 %");
         assert_eq!(percent_interval(-0.000_009, 0.000_058), "0.0 … 0.0 %");
         assert_eq!(percent_interval(f64::NAN, 0.5), "–");
+        assert_eq!(percent_estimate(0.004, 0.002, 0.005), "0.4 % (0.2 … 0.5 %)");
     }
 }

@@ -1,5 +1,6 @@
 //! Drives of the reference car as the diagnosis gets them.
 
+use gripsight_gap::Diagnosis;
 use gripsight_reference_car::{
     CarParameters, Course, DriverKind, EffectSetting, Friction, Scenario, SensorSample, Simulation,
 };
@@ -7,6 +8,12 @@ use gripsight_signals::{
     AlignConfig, Aligner, DriveSample, ImuSample, Measurement, OdometrySample, StateSequence, TelemetrySample,
 };
 use gripsight_vehicle::VehicleParameters;
+
+/// The diagnosis as the terminal shows it.
+#[allow(dead_code, reason = "not every user of this module shows one")]
+pub(crate) fn text(diagnosis: &Diagnosis) -> String {
+    gripsight_report::gap_text(diagnosis, None, &[])
+}
 
 const MU: f64 = 0.95;
 

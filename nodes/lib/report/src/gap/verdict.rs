@@ -1,0 +1,123 @@
+//! The verdict as a sentence: the same at the head of the page and on the terminal.
+
+use gripsight_gap::{Diagnosis, Verdict};
+
+use super::words::{closes, named};
+use crate::page::Tone;
+use crate::text::significant;
+
+/// Below this share of the gap the effects named close only a part of it.
+const MOST: f64 = 0.5;
+/// Mean squared error over the noise's from which what remains is worth a word.
+const REMAINS: f64 = 2.0;
+/// Error with other tires over that with flexible terms up to which the tires do what can be done.
+const NEAR_CEILING: f64 = 1.5;
+
+/// What a diagnosis comes to: of a car against its model, or of a car against its own earlier drive.
+pub(super) fn sentence(d: &Diagnosis, earlier: Option<&str>) -> String {
+    let since = earlier.map(|earlier| format!(" since {earlier}")).unwrap_or_default();
+    let times = format!("{} times the noise", significant(d.gap.after.value, 2));
+    let remains = remains(d);
+    match d.verdict {
+        Verdict::Effects => {
+            let effects: Vec<String> = d.effects.iter().filter(|e| e.accepted).map(named).collect();
+            let effects = enumerated(&effects);
+            let closed = closed(d);
+            if is_partial(d) {
+                let change = if earlier.is_some() { format!("Changed{since}: ") } else { String::new() };
+                return format!(
+                    "{change}{}, a part of the gap: {closed}; {times} remains, and none of the library's effects explains that.",
+                    if earlier.is_some() { effects } else { capital(&effects) }
+                );
+            }
+            let what = match earlier {
+                Some(_) => format!("What has changed{since} is"),
+                None => "The gap is".to_owned(),
+            };
+            let rest = if remains { format!("; {times} remains") } else { String::new() };
+            format!("{what} {effects}: {closed}{rest}.")
+        }
+        Verdict::TireRetuneOnly => match (earlier, tires_suffice(d)) {
+            (Some(_), true) => format!("The tires have changed{since}; no other effect is needed."),
+            (None, true) => "Other tires close the gap; no other effect is needed.".into(),
+            (Some(_), false) => format!("The tires have changed{since}; {times} remains."),
+            (None, false) => format!("Other tires are all that helps; {times} remains."),
+        },
+        Verdict::NoGap => {
+            let rest = if remains { format!(" ({times})") } else { String::new() };
+            match earlier {
+                Some(_) => format!(
+                    "Nothing has changed{since} but for noise and the model's usual imperfection{rest}."
+                ),
+                None => format!(
+                    "No gap: model and car agree within the noise and the model's usual imperfection{rest}."
+                ),
+            }
+        }
+        Verdict::NoneOfThese => match earlier {
+            Some(_) => format!(
+                "Something has changed{since} that no effect of the library explains: with other tires {times} remains."
+            ),
+            None => format!(
+                "There is a gap that no effect of the library explains: with other tires {times} remains."
+            ),
+        },
+        Verdict::NotIdentifiable => match d.reasons.first() {
+            Some(reason) => format!("These data cannot tell: {reason}."),
+            None => "These data cannot tell.".into(),
+        },
+    }
+}
+
+/// What the effects named close together.
+fn closed(d: &Diagnosis) -> String {
+    let closed = &d.gap_closed_fraction;
+    if closed.value < 0.0 {
+        "held-out errors grow with it".to_owned()
+    } else if closed.value.is_finite() {
+        format!("{} of what other tires leave closes", closes(closed))
+    } else {
+        "how much of what other tires leave closes cannot be stated".to_owned()
+    }
+}
+
+/// How the sentence is meant.
+pub(super) fn tone(d: &Diagnosis) -> Tone {
+    let open = match d.verdict {
+        Verdict::Effects => is_partial(d),
+        Verdict::TireRetuneOnly => !tires_suffice(d),
+        Verdict::NoGap => false,
+        Verdict::NoneOfThese | Verdict::NotIdentifiable => true,
+    };
+    if open { Tone::Caution } else { Tone::Good }
+}
+
+/// Whether the model that is named leaves more than the noise and a little.
+fn remains(d: &Diagnosis) -> bool {
+    d.gap.after.value > REMAINS * d.gap.noise_floor.value
+}
+
+/// Whether the effects named close less than about half of the gap, and clearly more than the noise remains.
+fn is_partial(d: &Diagnosis) -> bool {
+    let (g, noise) = (&d.gap, d.gap.noise_floor.value);
+    let closed = (g.retuned.value - g.after.value) / (g.retuned.value - noise).max(f64::MIN_POSITIVE);
+    remains(d) && closed < MOST
+}
+
+/// Whether other tires bring the model near what could be explained at all, and near the noise.
+fn tires_suffice(d: &Diagnosis) -> bool {
+    !remains(d) && d.gap.retuned.value <= NEAR_CEILING * d.gap.unstructured_ceiling.value
+}
+
+/// "a, b and c".
+fn enumerated(items: &[String]) -> String {
+    match items {
+        [first @ .., before, last] => [first, &[format!("{before} and {last}")]].concat().join(", "),
+        one_or_none => one_or_none.concat(),
+    }
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
+}
