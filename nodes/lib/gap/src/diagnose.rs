@@ -146,7 +146,7 @@ fn explain(
         noise_is_known,
     };
     let blocks = &windows.training.block;
-    let claims = claims(&engine, &evidence, &state, &remains, &library, blocks);
+    let mut claims = claims(&engine, &evidence, &state, &remains, &library, blocks);
     // What is no more than a candidate is left out of the model.
     let named: Vec<EffectId> = claims.iter().filter(|c| c.named).map(|c| c.effect).collect();
     let model = if named.is_empty() {
@@ -157,6 +157,7 @@ fn explain(
         let values = engine.carry(&state, &named);
         engine.fit(&named, &values, Some(state.starts.clone()), &windows.training, 10)
     };
+    claims.iter_mut().for_each(|claim| claim.with_company(&engine, &model, &windows.training));
     progress("scoring on held-out data");
     // What else there is stands beside what is named.
     let others = if named.is_empty() { &completed(&engine, first, &search_windows) } else { &last };

@@ -12,6 +12,7 @@ use crate::sizes::{is_told, sizes};
 use crate::state::State;
 use crate::transfer::UNTRIED;
 use crate::trust::TireTrust;
+use crate::windows::Windows;
 
 // Fixed on development cases, 2026-11-21: see tests/results/gap.
 
@@ -26,6 +27,8 @@ const LARGE_ERROR: f64 = 4.0;
 const HUGE_COST: f64 = 4.0;
 /// Confidence from which a drive to make sure of a candidate is worth it.
 const WORTH_A_DRIVE: f64 = 0.05;
+/// Iterations of a fit with what every car has beside an effect.
+const COMPANY: usize = 6;
 /// Candidates at most that a drive to make sure is proposed for, where nothing is named.
 const MOST_TO_MAKE_SURE: usize = 2;
 /// Excess of the nominal over the retuned model that makes it a retune.
@@ -43,7 +46,7 @@ pub(crate) struct Claim {
     untried: Vec<EffectId>,
     /// What speaks against naming it.
     doubts: Vec<String>,
-    /// How far its size drifts between data.
+    /// How far its size drifts between data, and with what every car has beside it.
     drift: f64,
     /// Whether it is sure enough, and its size told well enough, to be named.
     pub(crate) named: bool,
@@ -102,6 +105,29 @@ pub(crate) fn claims(
         Claim { effect, confidence: signs.confidence(), confused, untried, doubts, drift: signs.drift, named }
     };
     state.named.iter().zip(evidence).zip(Signs::together(&alone)).map(claim).collect()
+}
+
+impl Claim {
+    /// Counts in how far the size in a `model` changes where what every car has besides it is fitted, too. Steady push along the car is shared
+    /// between drag and rolling resistance, and where one of them is named the other is there as well.
+    pub(crate) fn with_company(&mut self, engine: &Engine<'_>, model: &State, windows: &Windows) {
+        let beside = match self.effect {
+            EffectId::AeroDrag => EffectId::RollingResistance,
+            EffectId::RollingResistance => EffectId::AeroDrag,
+            _ => return,
+        };
+        if !self.named || model.named.contains(&beside) || engine.holds(beside) {
+            return;
+        }
+        let named = [&model.named[..], &[beside]].concat();
+        let both =
+            engine.look(&named, &engine.carry(model, &named), Some(model.starts.clone()), windows, COMPANY);
+        let size = |of: &State| of.of(self.effect).and_then(|own| own.first().copied()).unwrap_or(f64::NAN);
+        let change = (size(&both) / size(model) - 1.0).abs();
+        if both.finite && change.is_finite() {
+            self.drift = self.drift.hypot(change);
+        }
+    }
 }
 
 /// What does nearly the same as an effect and is not in the library.
