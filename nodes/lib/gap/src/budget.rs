@@ -87,8 +87,9 @@ impl<'a> Scorer<'a> {
     }
 }
 
-/// Iterations of the fits of the steps between.
-const STEP_ITERATIONS: usize = 10;
+/// Iterations of the fits of the steps between, and of what was fitted to part of the windows already.
+const STEP_ITERATIONS: usize = 7;
+const CANDIDATE_ITERATIONS: usize = 4;
 /// How many of the effects that were not found are scored.
 const CANDIDATES: usize = 3;
 /// An interval of a share that is wider says nothing.
@@ -126,7 +127,7 @@ impl Budget {
                     &values,
                     Some(state.starts.clone()),
                     &windows.training,
-                    STEP_ITERATIONS,
+                    CANDIDATE_ITERATIONS,
                 );
                 let error = blocks(&alone.effects, None, &alone.parameters);
                 Some((effect, closed(steps.last()?, &error, &retuned)))

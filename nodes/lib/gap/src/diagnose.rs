@@ -6,6 +6,7 @@ use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 use crate::budget::{Budget, Models, Scorer, large_slip_rad};
 use crate::effects::{EffectId, Need};
 use crate::engine::Engine;
+use crate::model::HOLD;
 use crate::outcome::{DetectionLimit, Diagnosis, Invisible, TirePair, Unexplained};
 use crate::recording::Recording;
 use crate::rooms::{Left, explained};
@@ -166,6 +167,7 @@ fn explain(
     let (verdict, mut reasons) = decide(&budget, &claims, &remains, &costs);
     // What cannot be right comes right after the errors: it explains more than any effect.
     reasons.splice(1..1, plausible::doubts(&recording, request.vehicle));
+    reasons.extend(held_command(null.parameters[HOLD]));
     reasons.extend(request.earlier.map(|earlier| earlier.text()));
     reasons.extend(noise::caveat(&recording));
     let effects = rank(&engine, &claims, [&model, &state], blocks, others, &budget);
@@ -211,6 +213,17 @@ fn explain(
             rooms: before.gains.iter().zip(&after.gains).map(|(b, a)| (b.0.name(), [b.1, a.1])).collect(),
         },
         series: pictures::series(&engine, &nominal, &null, &model, &on_all, &nominal_score, scored_windows),
+    })
+}
+
+/// A sentence where the steering is so late by its hold alone that one could take it for a delay.
+fn held_command(hold_s: f64) -> Option<String> {
+    const LATE_S: f64 = 0.01;
+    (hold_s > LATE_S).then(|| {
+        format!(
+            "the steering acts {:.0} ms after its stamp, as a command that is held until the next one does: steering_delay and steering_lag are what comes on top",
+            1e3 * hold_s
+        )
     })
 }
 
