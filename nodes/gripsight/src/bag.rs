@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use gripsight_bag::effect::{EFFECTS, Effect};
 use gripsight_bag::{BagInfo, ReadReport, Role, TopicMap, Usable};
+use gripsight_report::topic_notes;
 use gripsight_signals::DataHealth;
 
 use crate::Outcome;
@@ -113,7 +114,7 @@ fn table(bag: &Path, info: &BagInfo) -> String {
         let _ = writeln!(
             text,
             "{:names$}  {:types$}  {:>8}  {:>8.2}  {:>5}  {:>14.3}",
-            t.name, t.type_name, t.messages, t.rate_hz, t.gaps, t.longest_step_s
+            t.name, t.type_name, t.messages, t.pace.rate_hz, t.pace.gaps, t.pace.longest_step_s
         );
     }
     match &info.telemetry {
@@ -137,6 +138,7 @@ fn usable(report: &ReadReport) -> String {
         let topic = report.streams.topic(role).unwrap_or("not recorded");
         let _ = writeln!(text, "  {:7} {topic}", role.name());
     }
+    text.extend(topic_notes(&report.topics).iter().map(|note| format!("  {note}\n")));
     for (count, what) in [
         (
             report.without_content,

@@ -11,7 +11,7 @@ use gripsight_bag::{ReadReport, Role, TopicMap, read_sequences};
 use gripsight_gap::{Diagnosis, Earlier, EffectId, ExtendedModelFile, Request, Verdict, diagnose};
 use gripsight_identification::export::{read_tires, stamp_text};
 use gripsight_identification::vehicle_hash;
-use gripsight_report::{GapInput, Header, gap_page, gap_text};
+use gripsight_report::{GapInput, Header, TopicUse, gap_page, gap_text, topic_notes, topic_uses};
 use gripsight_signals::{StateSequence, WindowConfig};
 use gripsight_vehicle::VehicleParameters;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -78,6 +78,17 @@ fn names() -> String {
 const FILES: [&str; 4] = ["gap.json", "report.html", "timing.json", MODEL_FILE];
 const MODEL_FILE: &str = "extended_model.yaml";
 
+/// gap.json: the diagnosis, and what it rests on.
+#[derive(Serialize)]
+struct GapFile<'a> {
+    #[serde(flatten)]
+    diagnosis: &'a Diagnosis,
+    /// The topics used.
+    topics: Vec<TopicUse<'a>>,
+    /// What reading the data met, in sentences.
+    data_notes: &'a [String],
+}
+
 #[derive(Serialize)]
 struct Timing {
     reading_s: f64,
@@ -133,11 +144,16 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         diagnosis: &result,
         header: &header,
         earlier: compared_with.as_deref(),
+        topics: &report.topics,
         data_notes: &notes,
     })?;
+    let gap_file = GapFile { diagnosis: &result, topics: topic_uses(&report.topics), data_notes: &notes };
     let timing = Timing { reading_s, diagnosing_s, total_s: start.elapsed().as_secs_f64() };
-    let texts =
-        [serde_json::to_string_pretty(&result)? + "\n", page, serde_json::to_string_pretty(&timing)? + "\n"];
+    let texts = [
+        serde_json::to_string_pretty(&gap_file)? + "\n",
+        page,
+        serde_json::to_string_pretty(&timing)? + "\n",
+    ];
     let mut files: Vec<(&str, String)> = FILES.into_iter().zip(texts).collect();
     if result.verdict != Verdict::NotIdentifiable {
         files.push((MODEL_FILE, result.extended_model.to_yaml()?));
@@ -235,6 +251,7 @@ fn header(bag: &Path, vehicle: &VehicleParameters, sequence: &StateSequence) -> 
 /// What reading the bag met, in sentences.
 fn data_notes(report: &ReadReport) -> Vec<String> {
     let mut notes: Vec<String> = report.truncated.clone().into_iter().collect();
+    notes.extend(topic_notes(&report.topics));
     if report.without_drive > 0 {
         notes.push(format!("{} odometry messages left out: no drive command in force", report.without_drive));
     }

@@ -79,7 +79,16 @@ fn diagnose_and_identify_take_the_extended_model_again() {
     let run = |arguments: &str| assert_eq!(gripsight(folder, arguments).0, 0, "{arguments}");
     run("simulate --effect steering_delay=0.03 --duration 20 --seed 62 --out laps.mcap");
     run("diagnose laps.mcap --vehicle laps.vehicle.yaml --out first --predictions first.mcap");
-    assert_eq!(json(&folder.join("first/gap.json"))["effects"][0]["name"], "steering_delay");
+    let first = json(&folder.join("first/gap.json"));
+    assert_eq!(first["effects"][0]["name"], "steering_delay");
+    assert_eq!(
+        (&first["gap"]["steps"][0]["effect"], first["data_notes"].as_array().unwrap().len()),
+        (&"steering_delay".into(), 0)
+    );
+    let streams: Vec<&str> =
+        first["topics"].as_array().unwrap().iter().map(|t| t["stream"].as_str().unwrap()).collect();
+    assert_eq!(streams, ["odom", "drive", "imu", "wheels"]);
+    assert!(first["topics"][2]["invisible_without"].as_array().unwrap().contains(&"imu_lever_arm".into()));
 
     // The recording once more, with the predictions of the first diagnosis in it.
     run(

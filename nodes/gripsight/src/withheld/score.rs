@@ -183,7 +183,7 @@ fn controls(answers: &[Answer], dir: &Path) -> anyhow::Result<BTreeMap<String, C
             // Drives may lack a stream; every case has the same figures.
             for topic in TOPICS {
                 let found = info.topics.iter().find(|t| t.name == topic);
-                figures.extend(found.map_or([0.0, 0.0], |t| [t.messages as f64, t.longest_step_s]));
+                figures.extend(found.map_or([0.0, 0.0], |t| [t.messages as f64, t.pace.longest_step_s]));
             }
         }
         for name in [files::VEHICLE, files::TIRES, files::WITHOUT] {

@@ -3,14 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use gripsight_signals::{DataHealth, WindowConfig};
+use gripsight_signals::{DataHealth, Pace, WindowConfig};
 use serde::Serialize;
 
 use crate::telemetry::sequences_of;
 use crate::{Bag, BagError, ReadReport, TopicMap};
-
-/// A pause this many median steps long is a gap.
-const GAP_STEPS: f64 = 2.5;
 
 /// A look into a bag.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -45,12 +42,9 @@ pub struct TopicInfo {
     pub encoding: String,
     /// Messages.
     pub messages: usize,
-    /// One over the median step of the log times; zero with fewer than two messages.
-    pub rate_hz: f64,
-    /// Pauses of more than 2.5 median steps.
-    pub gaps: usize,
-    /// The longest step.
-    pub longest_step_s: f64,
+    /// How regularly they were logged.
+    #[serde(flatten)]
+    pub pace: Pace,
 }
 
 /// What the suite would use of a bag.
@@ -101,15 +95,12 @@ pub fn info(path: &Path, topics: &TopicMap) -> Result<BagInfo, BagError> {
             .iter()
             .map(|topic| {
                 let times_ns = log_times_ns.get(&topic.name).map_or(&[][..], Vec::as_slice);
-                let pace = Pace::of(times_ns);
                 TopicInfo {
                     name: topic.name.clone(),
                     type_name: topic.type_name.clone(),
                     encoding: topic.encoding.clone(),
                     messages: times_ns.len(),
-                    rate_hz: pace.rate_hz,
-                    gaps: pace.gaps,
-                    longest_step_s: pace.longest_step_s,
+                    pace: Pace::of(times_ns.windows(2).map(|w| w[1].saturating_sub(w[0]) as f64 * 1e-9)),
                 }
             })
             .collect(),
@@ -124,28 +115,4 @@ fn usable(bag: &Bag, topics: &TopicMap) -> Usable {
         Ok(Usable::Sequences { report: Box::new(report), health })
     });
     looked.unwrap_or_else(|error| Usable::Nothing(error.to_string()))
-}
-
-/// How regularly messages came.
-#[derive(Default)]
-struct Pace {
-    rate_hz: f64,
-    gaps: usize,
-    longest_step_s: f64,
-}
-
-impl Pace {
-    fn of(times_ns: &[u64]) -> Self {
-        let mut steps_s: Vec<f64> =
-            times_ns.windows(2).map(|w| w[1].saturating_sub(w[0]) as f64 * 1e-9).collect();
-        steps_s.sort_by(f64::total_cmp);
-        let Some((&median_s, &longest_step_s)) = steps_s.get(steps_s.len() / 2).zip(steps_s.last()) else {
-            return Self::default();
-        };
-        Self {
-            rate_hz: if median_s > 0.0 { 1.0 / median_s } else { 0.0 },
-            gaps: steps_s.iter().filter(|&&step_s| step_s > GAP_STEPS * median_s).count(),
-            longest_step_s,
-        }
-    }
 }

@@ -16,6 +16,7 @@ pub mod decode;
 pub mod effect;
 pub mod encode;
 mod error;
+mod health;
 mod info;
 mod inject;
 mod records;

@@ -3,21 +3,23 @@
 use std::path::Path;
 
 use gripsight_signals::{
-    AlignConfig, Aligner, Measurement, SignalError, StateSequence, WindowConfig, WindowCutter,
+    AlignConfig, Aligner, Measurement, SignalError, StateSequence, TopicHealth, WindowConfig, WindowCutter,
 };
 use serde::Serialize;
 
 use crate::sequence::read_recorded;
-use crate::{Bag, BagError, Role, Streams, TopicMap, decode};
+use crate::{Bag, BagError, Role, Streams, TopicMap, decode, health};
 
 /// What reading a bag met.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct ReadReport {
     /// Where each stream was found.
     pub streams: Streams,
     /// Messages by stream, in the order of [`Role::ALL`].
     #[serde(serialize_with = "crate::topics::by_role")]
     pub counts: [usize; 4],
+    /// State of each stream's messages, in the order of [`Role::ALL`]; empty where recorded sequences were used.
+    pub topics: Vec<TopicHealth>,
     /// Messages that said nothing about their stream: joints that are not the four wheels, sensors that report "not measured".
     pub without_content: usize,
     /// Odometry left out because no drive command was in force.
@@ -43,6 +45,7 @@ fn measurements_of(bag: &Bag, topics: &TopicMap) -> Result<(Vec<Measurement>, Re
     let streams = topics.resolve(bag)?;
     let mut report = ReadReport { streams, ..ReadReport::default() };
     let mut measurements = Vec::new();
+    let mut log_times_ns = Vec::new();
     for message in bag.messages() {
         let message = match message {
             Ok(message) => message,
@@ -56,7 +59,10 @@ fn measurements_of(bag: &Bag, topics: &TopicMap) -> Result<(Vec<Measurement>, Re
         let Some(role) = report.streams.role(topic) else { continue };
         let count = &mut report.counts[role as usize];
         match decode::measurement(role, &message.data) {
-            Ok(Some(measurement)) => measurements.push(measurement),
+            Ok(Some(measurement)) => {
+                measurements.push(measurement);
+                log_times_ns.push(message.log_time);
+            }
             Ok(None) => report.without_content += 1,
             Err(error) => return Err(error.in_message(topic, *count, message.log_time)),
         }
@@ -65,6 +71,7 @@ fn measurements_of(bag: &Bag, topics: &TopicMap) -> Result<(Vec<Measurement>, Re
     if measurements.is_empty() {
         return Err(BagError::Empty { path: bag.path().to_owned() });
     }
+    report.topics = health::of(&report.streams, &measurements, &log_times_ns);
     Ok((measurements, report))
 }
 

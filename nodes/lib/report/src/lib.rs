@@ -16,6 +16,7 @@ mod identification;
 mod page;
 mod role;
 pub mod text;
+mod topics;
 mod withheld;
 
 pub use chart::{Axis, Chart, Layer};
@@ -24,4 +25,5 @@ pub use gap::{GapInput, gap_page, gap_text};
 pub use identification::{IdentificationInput, identification_page};
 pub use page::Header;
 pub use role::Role;
+pub use topics::{TopicUse, topic_notes, topic_uses};
 pub use withheld::{WithheldInput, withheld_page};

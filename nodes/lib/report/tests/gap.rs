@@ -9,8 +9,8 @@ use gripsight_gap::{
     Diagnosis, EffectParameter, Estimate, ExtendedModelFile, GapBudget, GapStep, Identity, Invisible, Need,
     Place, Prediction, RankedEffect, Series, TirePair, Unexplained, Verdict, Where,
 };
-use gripsight_report::{GapInput, Header, gap_page, gap_text};
-use gripsight_signals::DataHealth;
+use gripsight_report::{GapInput, Header, gap_page, gap_text, topic_notes};
+use gripsight_signals::{DataHealth, Pace, Spikes, TopicHealth};
 use gripsight_vehicle::PacejkaParameters;
 
 fn estimate(value: f64, half: f64) -> Estimate {
@@ -141,6 +141,36 @@ fn diagnosis() -> Diagnosis {
     }
 }
 
+/// Odometry with spikes, and drive commands at a tenth of its rate.
+fn topics() -> Vec<TopicHealth> {
+    let topic = |stream, name: &str, rate_hz: f64, spikes: Vec<Spikes>| TopicHealth {
+        stream,
+        topic: Some(name.to_owned()),
+        type_name: "nav_msgs/msg/Odometry",
+        messages: (60.0 * rate_hz) as usize,
+        pace: Pace { rate_hz, jitter_s: 1e-4, gaps: 0, longest_step_s: 1.1 / rate_hz, lost_share: 0.0 },
+        delay_s: Some(0.004),
+        spikes,
+    };
+    let spikes = vec![Spikes { channel: "v_y_mps", count: 6, first_s: 12.3, largest: 3.04 }];
+    let absent = TopicHealth { topic: None, messages: 0, delay_s: None, ..topic("imu", "", 1.0, Vec::new()) };
+    vec![topic("odom", "/odom", 100.0, spikes), topic("drive", "/drive", 10.0, Vec::new()), absent]
+}
+
+#[test]
+fn what_is_the_matter_with_a_topic_is_said() {
+    assert_eq!(
+        topic_notes(&topics()),
+        [
+            "/odom: 6 single samples of v_y_mps out by up to 3.0 (first at 12.3 s)",
+            "/drive: 10.0 Hz beside odometry at 100 Hz: each command is held until the next",
+        ]
+    );
+    let html = page(&diagnosis());
+    let table = &html[html.find("<table").unwrap()..html.find("</table>").unwrap()];
+    assert!(table.contains("not recorded") && table.contains("aero drag"), "the first table: {table}");
+}
+
 fn page(diagnosis: &Diagnosis) -> String {
     page_since(diagnosis, None)
 }
@@ -155,7 +185,7 @@ fn page_since(diagnosis: &Diagnosis, earlier: Option<&str>) -> String {
         seed: None,
         command: "gripsight diagnose laps.mcap --out DIR".into(),
     };
-    gap_page(&GapInput { diagnosis, header: &header, earlier, data_notes: &[] }).unwrap()
+    gap_page(&GapInput { diagnosis, header: &header, earlier, topics: &topics(), data_notes: &[] }).unwrap()
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::{SignalError, StateSequence, segment};
+use crate::{Pace, SignalError, StateSequence, segment};
 
 /// A pause in the samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -60,18 +60,15 @@ impl DataHealth {
         let time_s = &sequence.time_s;
         let dt_s = segment::median_step_s(time_s);
         let steps = time_s.windows(2).map(|w| (f64::from(w[0]), f64::from(w[1])));
+        let pace = Pace::of(steps.clone().map(|(a, b)| b - a));
         let is_gap = |from_s: f64, to_s: f64| to_s - from_s > segment::GAP_STEPS * dt_s;
-        let gaps =
-            steps.clone().filter(|&(a, b)| is_gap(a, b)).map(|(from_s, to_s)| Gap { from_s, to_s }).collect();
-        let regular: Vec<f64> = steps.filter(|&(a, b)| !is_gap(a, b)).map(|(a, b)| b - a).collect();
-        let mean = regular.iter().sum::<f64>() / regular.len().max(1) as f64;
-        let variance = regular.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / regular.len().max(1) as f64;
+        let gaps = steps.filter(|&(a, b)| is_gap(a, b)).map(|(from_s, to_s)| Gap { from_s, to_s }).collect();
         let moving = sequence.v_x_mps.iter().filter(|v| v.abs() > MOVING_MPS).count();
         Ok(Self {
             samples: sequence.len(),
             duration_s: sequence.duration_s(),
-            rate_hz: 1.0 / dt_s,
-            jitter_s: variance.sqrt(),
+            rate_hz: pace.rate_hz,
+            jitter_s: pace.jitter_s,
             gaps,
             frozen: frozen(sequence),
             moving_share: moving as f64 / sequence.len() as f64,

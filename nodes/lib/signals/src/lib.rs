@@ -14,6 +14,7 @@ mod health;
 mod measurement;
 mod segment;
 mod sequence;
+mod topic;
 mod window;
 
 pub use align::{AlignConfig, Aligner};
@@ -23,6 +24,7 @@ pub use health::{DataHealth, FrozenSpan, Gap};
 pub use measurement::{DriveSample, ImuSample, Measurement, OdometrySample, TelemetrySample, WheelsSample};
 pub use segment::{Segment, segments};
 pub use sequence::StateSequence;
+pub use topic::{Pace, Spikes, TopicHealth};
 pub use window::{WindowConfig, WindowCutter};
 
 /// Nanoseconds in a second.

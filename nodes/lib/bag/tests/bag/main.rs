@@ -7,6 +7,7 @@
 )]
 
 mod errors;
+mod health;
 mod hostile;
 mod inject;
 mod peers;

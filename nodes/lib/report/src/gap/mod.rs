@@ -8,6 +8,7 @@ mod verdict;
 mod words;
 
 use gripsight_gap::{Diagnosis, Verdict};
+use gripsight_signals::TopicHealth;
 use maud::{Markup, html};
 
 pub use terminal::gap_text;
@@ -24,6 +25,8 @@ pub struct GapInput<'a> {
     pub header: &'a Header,
     /// The earlier drive's name where two drives are compared: its tires are the model's.
     pub earlier: Option<&'a str>,
+    /// The topics that the data come from; empty where they come as sequences.
+    pub topics: &'a [TopicHealth],
     /// What reading the data met, a sentence each.
     pub data_notes: &'a [String],
 }
@@ -35,7 +38,7 @@ pub struct GapInput<'a> {
 pub fn gap_page(input: &GapInput<'_>) -> Result<String, ReportError> {
     let d = input.diagnosis;
     let body = html! {
-        (section("Data", true, &tables::data(d, input.data_notes)))
+        (section("Data", true, &tables::data(d, input.topics, input.data_notes)))
         @if d.verdict == Verdict::NotIdentifiable {
             (section("Drive or record next", true, &next(d)))
         } @else {

@@ -1,6 +1,7 @@
 //! Tables of a diagnosis.
 
 use gripsight_gap::{Diagnosis, Place};
+use gripsight_signals::TopicHealth;
 use gripsight_vehicle::MagicFormula;
 use maud::{Markup, html};
 
@@ -125,10 +126,11 @@ pub(super) fn identities(d: &Diagnosis) -> Vec<(String, String)> {
     d.identities.iter().map(|i| (i.name.to_owned(), i.finding.clone())).collect()
 }
 
-/// What the data are like.
-pub(super) fn data(d: &Diagnosis, notes: &[String]) -> Markup {
+/// What the data are like: topic by topic, what the matter is, and the streams joined.
+pub(super) fn data(d: &Diagnosis, topics: &[TopicHealth], notes: &[String]) -> Markup {
     html! {
-        (facts_table(&health(&d.data_health)))
+        @if !topics.is_empty() { (crate::topics::table(topics)) }
         @if !notes.is_empty() { (list(notes, "")) }
+        (facts_table(&health(&d.data_health)))
     }
 }

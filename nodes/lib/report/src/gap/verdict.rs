@@ -117,7 +117,11 @@ fn enumerated(items: &[String]) -> String {
     }
 }
 
+/// As a sentence begins; a symbol such as v_y stays as it is.
 fn capital(text: &str) -> String {
+    if text.starts_with("v_") || text.starts_with("a_") {
+        return text.to_owned();
+    }
     let mut letters = text.chars();
     letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }
