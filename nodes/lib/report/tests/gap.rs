@@ -323,6 +323,25 @@ fn the_terminal_names_no_step_that_is_not_there() {
 }
 
 #[test]
+fn the_likeliest_candidate_is_always_listed() {
+    let mut d = diagnosis();
+    let names = [
+        "cog_shift",
+        "v_y_bias",
+        "v_y_lever_arm",
+        "road_bank",
+        "steering_gain",
+        "steering_lag",
+        "cross_wind",
+    ];
+    let candidates = names.map(|name| RankedEffect { name, ..d.effects[1].clone() });
+    d.effects.extend(candidates);
+    d.effects.last_mut().unwrap().confidence = 0.37;
+    assert!(gap_text(&d, None, &[]).contains("  cross_wind "));
+    assert!(page(&d).contains("<td>cross wind</td>"));
+}
+
+#[test]
 fn where_the_data_cannot_tell_there_is_the_reason_the_data_and_what_to_drive() {
     let mut d = diagnosis();
     d.verdict = Verdict::NotIdentifiable;

@@ -5,7 +5,7 @@ use gripsight_signals::TopicHealth;
 use gripsight_vehicle::MagicFormula;
 use maud::{Markup, html};
 
-use super::words::{closes, sizes, unit, words};
+use super::words::{closes, listed, sizes, unit, words};
 use crate::health::health;
 use crate::page::{facts_table, list};
 use crate::text::{interval, percent, significant};
@@ -20,7 +20,7 @@ pub(super) fn effects(d: &Diagnosis) -> Markup {
             table.effects {
                 thead { tr { th { "Effect" } th { "Size (90 %)" } th { "Closes" } th { "Confidence" } th { "Not told from" } } }
                 tbody {
-                    @for e in d.effects.iter().take(SHOWN) {
+                    @for e in listed(d, SHOWN) {
                         tr class=[e.accepted.then_some("named")] {
                             td { (words(e.name)) }
                             td { (sizes(e)) }

@@ -5,11 +5,13 @@ use std::fmt::Write;
 use gripsight_gap::{Diagnosis, Estimate, Place, Verdict};
 
 use super::verdict::sentence;
-use super::words::{closes, sizes, unit, words};
+use super::words::{closes, listed, sizes, unit, words};
 use crate::text::{estimate_of, fixed, interval, percent};
 
-/// Effects listed.
-const SHOWN: usize = 5;
+/// Candidates listed beside the effects named.
+const CANDIDATES: usize = 3;
+/// Circumstances listed.
+const CIRCUMSTANCES: usize = 2;
 
 /// The diagnosis in some 25 lines. `earlier` names the drive from before where two are compared; `data_notes` is what reading the data met.
 #[must_use]
@@ -34,15 +36,18 @@ pub fn gap_text(d: &Diagnosis, earlier: Option<&str>, data_notes: &[String]) -> 
         lines(&mut out, "next       ", &d.drive_next);
         return out;
     }
-    for identity in &d.identities {
+    for identity in d.identities.iter().filter(|i| i.informative) {
         let _ = writeln!(out, "identity   {}: {}", identity.name, identity.finding);
     }
     budget(&mut out, d);
     effects(&mut out, d);
     places(&mut out, d);
-    if !d.invisible.is_empty() {
-        let names: Vec<&str> = d.invisible.iter().map(|i| i.name).collect();
-        let _ = writeln!(out, "invisible  {}", names.join(", "));
+    // What `next` says how to see needs no line of its own.
+    let invisible =
+        d.invisible.iter().map(|i| i.name).filter(|name| !d.drive_next.iter().any(|n| n.contains(name)));
+    let invisible: Vec<&str> = invisible.collect();
+    if !invisible.is_empty() {
+        let _ = writeln!(out, "invisible  {}", invisible.join(", "));
     }
     // The first repeats the figures.
     lines(&mut out, "because    ", d.reasons.get(1..).unwrap_or_default());
@@ -81,7 +86,8 @@ fn budget(out: &mut String, d: &Diagnosis) {
 
 /// The best effects: `*` marks those named.
 fn effects(out: &mut String, d: &Diagnosis) {
-    for e in d.effects.iter().take(SHOWN) {
+    let named = d.effects.iter().filter(|e| e.accepted).count();
+    for e in listed(d, named + CANDIDATES) {
         let mark = if e.accepted { '*' } else { ' ' };
         let group = if e.confused_with.is_empty() {
             String::new()
@@ -102,7 +108,6 @@ fn effects(out: &mut String, d: &Diagnosis) {
 
 /// The channels by their share, and the circumstances that stand out most from an even spread.
 fn places(out: &mut String, d: &Diagnosis) {
-    const SHOWN: usize = 3;
     let w = &d.places;
     let mut channels: Vec<&Place> = w.channel.iter().collect();
     channels.sort_by(|a, b| b.share.total_cmp(&a.share));
@@ -127,7 +132,7 @@ fn places(out: &mut String, d: &Diagnosis) {
         })
         .collect();
     worst.sort_by(|a, b| b.0.total_cmp(&a.0));
-    for (times, name, p) in worst.into_iter().take(SHOWN) {
+    for (times, name, p) in worst.into_iter().take(CIRCUMSTANCES) {
         let _ = writeln!(
             out,
             "           {name} {}{}: {}, {times:.1} times its share of the samples",

@@ -1,6 +1,6 @@
 //! Names and sizes as people read them, on the page and on the terminal.
 
-use gripsight_gap::{EffectParameter, Estimate, RankedEffect};
+use gripsight_gap::{Diagnosis, EffectParameter, Estimate, RankedEffect};
 
 use crate::text::{interval, percent, percent_estimate, significant, with_interval};
 
@@ -50,6 +50,21 @@ fn size(name: &str, p: &EffectParameter) -> String {
         (false, false) => return format!("{name} {NOT_TOLD}{before}"),
     };
     format!("{name} {value} ({range}){unit}{before}")
+}
+
+/// The effects to list, at most so many: those named, then candidates by what they would close; the likeliest candidate is always among them.
+pub(super) fn listed(d: &Diagnosis, most: usize) -> Vec<&RankedEffect> {
+    let mut listed: Vec<&RankedEffect> = d.effects.iter().take(most).collect();
+    let likeliest =
+        d.effects.iter().filter(|e| !e.accepted).max_by(|a, b| a.confidence.total_cmp(&b.confidence));
+    if let (Some(likeliest), Some(last)) = (likeliest, listed.last_mut())
+        && !last.accepted
+        && likeliest.confidence > 0.0
+        && d.effects.iter().position(|e| e.name == likeliest.name) >= Some(most)
+    {
+        *last = likeliest;
+    }
+    listed
 }
 
 /// The parameters of an effect with their intervals.
