@@ -139,7 +139,12 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     let diagnosing_s = start.elapsed().as_secs_f64() - reading_s;
     let header = header(subject, &vehicle, &sequence);
     let compared_with = args.bag2.as_ref().map(|_| file_name(&args.bag));
-    let notes = data_notes(&report);
+    let mut notes = data_notes(&report);
+    for (path, beside) in [(Some(&args.bag), &first), (args.heldout.as_ref(), &held_out)] {
+        if let (Some(path), Some((_, report))) = (path, beside) {
+            notes.extend(data_notes(report).iter().map(|note| format!("{}: {note}", file_name(path))));
+        }
+    }
     let page = gap_page(&GapInput {
         diagnosis: &result,
         header: &header,
