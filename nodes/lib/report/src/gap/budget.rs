@@ -3,10 +3,10 @@
 use gripsight_gap::{Diagnosis, Estimate};
 use maud::{Markup, html};
 
-use super::words::{channel_unit, words};
+use super::words::{channel_unit, figure, words};
 use crate::Role;
 use crate::bars::{Bar, bars, logarithmic};
-use crate::text::{estimate_of, significant};
+use crate::text::significant;
 
 /// A bar from nothing.
 fn total(name: &str, role: Role, e: &Estimate) -> Bar {
@@ -15,8 +15,8 @@ fn total(name: &str, role: Role, e: &Estimate) -> Bar {
         role,
         from: 0.0,
         to: e.value,
-        interval: (e.low < e.high).then_some((e.low, e.high)),
-        value: estimate_of(e.value, e.low, e.high),
+        interval: (e.low < e.high && (e.high - e.low).is_finite()).then_some((e.low, e.high)),
+        value: figure(e),
     }
 }
 
@@ -24,7 +24,7 @@ fn total(name: &str, role: Role, e: &Estimate) -> Bar {
 fn step(name: &str, role: Role, from: f64, e: &Estimate) -> Bar {
     let change = e.value - from;
     let sign = if change > 0.0 { "+" } else { "" };
-    let value = format!("{sign}{} to {}", significant(change, 3), estimate_of(e.value, e.low, e.high));
+    let value = format!("{sign}{} to {}", significant(change, 3), figure(e));
     Bar { from, value, ..total(name, role, e) }
 }
 

@@ -5,8 +5,8 @@ use std::fmt::Write;
 use gripsight_gap::{Diagnosis, Estimate, Place, Verdict};
 
 use super::verdict::sentence;
-use super::words::{closes, listed, sizes, unit, words};
-use crate::text::{estimate_of, fixed, interval, percent};
+use super::words::{closes, figure, listed, sizes, unit, words};
+use crate::text::{fixed, interval, percent};
 
 /// Candidates listed beside the effects named.
 const CANDIDATES: usize = 3;
@@ -72,7 +72,7 @@ fn budget(out: &mut String, d: &Diagnosis) {
     );
     let mut line = |name: &str, e: &Estimate| {
         if e.value.is_finite() {
-            let _ = writeln!(out, "  {name:<28} {}", estimate_of(e.value, e.low, e.high));
+            let _ = writeln!(out, "  {name:<28} {}", figure(e));
         }
     };
     line("model as it came", &g.nominal);

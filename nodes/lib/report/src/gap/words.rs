@@ -2,7 +2,7 @@
 
 use gripsight_gap::{Diagnosis, EffectParameter, Estimate, RankedEffect};
 
-use crate::text::{interval, percent, percent_estimate, significant, with_interval};
+use crate::text::{estimate_of, interval, percent, percent_estimate, significant, with_interval};
 
 /// Ends beyond so many times the value tell nothing of it.
 const WIDEST: f64 = 10.0;
@@ -72,6 +72,15 @@ pub(super) fn sizes(effect: &RankedEffect) -> String {
     effect.parameters.iter().map(|(name, p)| size(name, p)).collect::<Vec<_>>().join(", ")
 }
 
+/// A figure of the budget with its interval; of too few blocks there is none.
+pub(super) fn figure(e: &Estimate) -> String {
+    if e.value.is_finite() && !(e.low.is_finite() && e.high.is_finite()) {
+        format!("{} (interval {NOT_TOLD})", significant(e.value, 3))
+    } else {
+        estimate_of(e.value, e.low, e.high)
+    }
+}
+
 /// What an effect closes.
 pub(super) fn closes(fraction: &Estimate) -> String {
     if fraction.value.is_nan() {
@@ -126,5 +135,7 @@ mod tests {
         assert_eq!(closes(&estimate(-0.78)), "makes held-out errors larger");
         assert_eq!(closes(&estimate(0.62)), "62 % (52 … 72 %)");
         assert_eq!(closes(&Estimate::UNKNOWN), "not stated");
+        let two_blocks = Estimate { value: 8.0, low: f64::NEG_INFINITY, high: f64::INFINITY };
+        assert_eq!(figure(&two_blocks), "8.00 (interval not told)");
     }
 }
