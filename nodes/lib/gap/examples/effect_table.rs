@@ -99,6 +99,10 @@ fn driven(car: &CarParameters, name: &str, quiet: &StateSequence) -> Vec<(f64, f
     let p = &spec.parameters[0];
     let typical = if car.wheelbase_m() < 1.0 { p.typical_small } else { p.typical };
     let of = |share: f64| {
+        // More use of the grip than all of it there is not.
+        if name == "combined_slip" && share > 1.0 {
+            return None;
+        }
         let size = match p.null {
             Some(null) if null.is_finite() => null + share * (typical - null),
             _ => typical / share,
@@ -153,10 +157,11 @@ fn row(
 fn answer(name: &str, true_size: f64, d: &Diagnosis, without: &Diagnosis, p: &EffectParameter) -> String {
     let accepted: Vec<_> = d.effects.iter().filter(|e| e.accepted).collect();
     let no_gap = matches!(d.verdict, Verdict::NoGap | Verdict::TireRetuneOnly);
-    // An effect that was there before is told by what has come on top of it.
+    // What the reference drive shows of an effect may be the plant's own, or something else that the effect takes the place of.
     let null = effect_spec(name).ok().and_then(|s| s.parameters[0].null).unwrap_or_default();
-    let told = true_size + p.before.map_or(0.0, |before| before - null);
-    let inside = if p.low <= told && told <= p.high { "inside" } else { "outside" };
+    let on_top = true_size + p.before.map_or(0.0, |before| before - null);
+    let told = [true_size, on_top].iter().any(|size| (p.low..=p.high).contains(size));
+    let inside = if told { "inside" } else { "outside" };
     let only = if accepted.len() > 1 { " and more" } else { "" };
     let no_more = |of: fn(&Diagnosis) -> f64| of(d) < UNSEEN * of(without);
     match accepted.iter().position(|e| e.name == name) {

@@ -81,6 +81,12 @@ impl<'a> Scorer<'a> {
         }
     }
 
+    /// Mean squared error of a model over the noise.
+    pub(crate) fn error(&self, state: &State) -> f64 {
+        let score = self.engine.score(&state.effects, None, &state.parameters, &self.windows);
+        mean(&by_block(self.engine.recording, &self.windows, &score))
+    }
+
     /// What sizes are compared on: the held-out data in windows as they are fitted. Nothing where no data are held out.
     pub(crate) fn apart(&self) -> Option<(&Engine<'a>, Windows)> {
         self.held_out.then(|| (&self.engine, of_length(self.engine.recording, &self.windows, WINDOW_S)))

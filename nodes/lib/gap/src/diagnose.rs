@@ -10,13 +10,13 @@ use crate::model::HOLD;
 use crate::outcome::{DetectionLimit, Diagnosis, Invisible, TirePair, Unexplained};
 use crate::recording::Recording;
 use crate::rooms::{Left, explained};
-use crate::search::{Found, completed, search};
+use crate::search::{Found, completed, search, without};
 use crate::select::reweigh;
 use crate::state::State;
 use crate::transfer::drifts;
 use crate::trust::TireTrust;
 use crate::usable::{Usable, cannot_tell, refused, usable};
-use crate::verdict::{Remains, claims, decide, drive_next, looks, rank, record_next};
+use crate::verdict::{Claim, Remains, claims, decide, drive_next, looks, rank, record_next};
 use crate::windows::{Windows, split};
 use crate::{Earlier, ExtendedModelFile, GapError, noise, pictures, place, plausible};
 
@@ -148,16 +148,28 @@ fn explain(
     };
     let blocks = &windows.training.block;
     let mut claims = claims(&engine, &evidence, &state, &remains, &library, blocks);
-    // What is no more than a candidate is left out of the model.
-    let named: Vec<EffectId> = claims.iter().filter(|c| c.named).map(|c| c.effect).collect();
-    let model = if named.is_empty() {
-        null.clone()
-    } else if named.len() == state.named.len() {
-        state.clone()
-    } else {
+    // What is no more than a candidate is left out of the model, and what harms where it was not fitted is no more.
+    let model_of = |claims: &[Claim]| {
+        let named: Vec<EffectId> = claims.iter().filter(|c| c.named).map(|c| c.effect).collect();
+        if named.is_empty() {
+            return null.clone();
+        } else if named.len() == state.named.len() {
+            return state.clone();
+        }
         let values = engine.carry(&state, &named);
         engine.fit(&named, &values, Some(state.starts.clone()), &windows.training, 10)
     };
+    let mut model = model_of(&claims);
+    let with = scorer.error(&model);
+    let mut harm = false;
+    for claim in claims.iter_mut().filter(|claim| claim.is_unsure()) {
+        let simpler = without(&engine, &model, claim.effect, &windows.training);
+        harm |= claim.doubt_if_harmful(with, scorer.error(&simpler));
+    }
+    if harm {
+        model = model_of(&claims);
+    }
+    let named = &model.named;
     claims.iter_mut().for_each(|claim| claim.with_company(&engine, &model, &windows.training));
     progress("scoring on held-out data");
     // What else there is stands beside what is named.

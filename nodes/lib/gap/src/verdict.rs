@@ -107,7 +107,27 @@ pub(crate) fn claims(
     state.named.iter().zip(evidence).zip(Signs::together(&alone)).map(claim).collect()
 }
 
+/// Confidence from which an effect is the cause though it does not help where it was not fitted.
+const NEARLY_CERTAIN: f64 = 0.9;
+/// Held-out error with an effect over that without it from which it harms.
+const HARM: f64 = 1.01;
+
 impl Claim {
+    /// Whether it is named, but not so sure that it could be spared a look at held-out data.
+    pub(crate) fn is_unsure(&self) -> bool {
+        self.named && self.confidence < NEARLY_CERTAIN
+    }
+
+    /// Takes the name from it if the held-out error with it is larger than that without; whether it did.
+    pub(crate) fn doubt_if_harmful(&mut self, with: f64, without: f64) -> bool {
+        let harms = with > HARM * without;
+        if harms {
+            self.named = false;
+            self.doubts.push("it makes held-out errors larger".to_owned());
+        }
+        harms
+    }
+
     /// Counts in how far the size in a `model` changes where what every car has besides it is fitted, too. Steady push along the car is shared
     /// between drag and rolling resistance, and where one of them is named the other is there as well.
     pub(crate) fn with_company(&mut self, engine: &Engine<'_>, model: &State, windows: &Windows) {
@@ -349,4 +369,27 @@ pub(crate) fn drive_next(effects: &[RankedEffect]) -> Vec<String> {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_harms_where_it_was_not_fitted_keeps_its_name_only_where_it_is_nearly_certain() {
+        let claim = |confidence| Claim {
+            effect: EffectId::CogShift,
+            confidence,
+            confused: Vec::new(),
+            untried: Vec::new(),
+            doubts: Vec::new(),
+            drift: 0.1,
+            named: true,
+        };
+        assert!(!claim(0.95).is_unsure());
+        let mut helps = claim(0.6);
+        assert!(helps.is_unsure() && !helps.doubt_if_harmful(1.2, 1.4) && helps.named);
+        let mut harms = claim(0.6);
+        assert!(harms.doubt_if_harmful(1.4, 1.2) && !harms.named && harms.doubts.len() == 1);
+    }
 }

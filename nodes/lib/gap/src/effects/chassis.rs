@@ -60,7 +60,8 @@ impl Effect for CogShift {
         "l_f -= dl, l_r += dl, static loads follow; v_y is still measured at the nominal point",
         "fuel, ballast, corner weights not taken",
         "medium and high lateral acceleration, transients",
-        &[both_sides("dl_m", "m", [0.01, 0.08])],
+        // Further than a twelfth of the wheelbase nobody misplaces it.
+        &[ParameterSpec { range: [-2.5, 2.5], ..both_sides("dl_m", "m", [0.01, 0.08]) }],
     );
 
     fn car<T: Real>(p: &[T], car: &mut Car<T>) {

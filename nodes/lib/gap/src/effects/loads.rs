@@ -63,3 +63,42 @@ impl Effect for AeroDownforce {
 
 /// What the longitudinal effects need.
 pub(super) const COMMAND: &[Need] = &[Need::LongitudinalCommand];
+
+#[cfg(test)]
+mod tests {
+    use gripsight_vehicle::VehicleParameters;
+
+    use super::super::longitudinal::AeroDrag;
+    use super::*;
+
+    #[test]
+    fn only_what_the_tires_push_moves_load() {
+        const C_1PM: f64 = 8e-3;
+        const V_X_MPS: f64 = 7.0;
+        let mut car = Car::nominal(&VehicleParameters::f1tenth(), [1.0, 1.0]);
+        AeroDrag::car(&[C_1PM], &mut car);
+        let front_n = |a_x_mps2: f64| {
+            let at = Moment {
+                v_x_mps: V_X_MPS,
+                yaw_rate_radps: 0.0,
+                a_y_mps2: 0.0,
+                rolled_a_y_mps2: 0.0,
+                front_use: 0.0,
+                a_x_mps2,
+                force_x_mps2: 0.0,
+                minutes: 0.0,
+                lap_share: 0.0,
+                lap_m: 0.0,
+                place_rad: 0.0,
+            };
+            let mut axles = car.axles_at_rest();
+            LongitudinalLoadTransfer::loads(&[0.06], &car, &at, &mut axles);
+            axles.front.load_n
+        };
+        let at_rest_n = car.axles_at_rest().front.load_n;
+        // Coasting against the wind, and held at its speed by the tires.
+        approx::assert_relative_eq!(front_n(-C_1PM * V_X_MPS * V_X_MPS), at_rest_n, epsilon = 1e-12);
+        let moved_n = 0.06 * car.mass_kg * C_1PM * V_X_MPS * V_X_MPS / car.wheelbase_m();
+        approx::assert_relative_eq!(front_n(0.0), at_rest_n - moved_n, epsilon = 1e-12);
+    }
+}
