@@ -164,13 +164,15 @@ pub(crate) fn decide(
 ) -> (Verdict, Vec<String>) {
     let (nominal, retuned, after) = (mean(&budget.nominal), budget.retuned(), budget.after());
     let ceiling = mean(&budget.ceiling).min(after);
+    let named = claims.iter().any(|c| c.named);
+    let with_effects = if named { format!(", {after:.2} with the effects") } else { String::new() };
     let mut reasons = vec![format!(
-        "mean squared rollout error over noise: {nominal:.2} nominal, {retuned:.2} with retuned tires, {after:.2} with the effects, {ceiling:.2} with flexible terms, 1 is noise"
+        "mean squared rollout error over noise: {nominal:.2} nominal, {retuned:.2} with retuned tires{with_effects}, {ceiling:.2} with flexible terms, 1 is noise"
     )];
     if retuned > WORSE * nominal {
         reasons.push("the tires fitted to the training blocks do worse on the held-out ones than the nominal tires: the drive is not alike throughout".to_owned());
     }
-    if claims.iter().any(|c| c.named) {
+    if named {
         let reached = (retuned - after) / (retuned - ceiling).max(1e-9);
         reasons.push(format!(
             "the named effects explain {:.0} % of what could be explained on held-out data",
