@@ -93,9 +93,9 @@ impl<'a> Scorer<'a> {
     }
 }
 
-/// Iterations of the fits of the steps between, and of what was fitted to part of the windows already.
+/// Iterations of the fits of the steps between, and of what else was tried: where nothing is named, candidates are all there is to see.
 const STEP_ITERATIONS: usize = 7;
-const CANDIDATE_ITERATIONS: usize = 4;
+const CANDIDATE_ITERATIONS: [usize; 2] = [4, 20];
 /// How many of the effects that were not found are scored.
 const CANDIDATES: usize = 3;
 /// An interval of a share that is wider says nothing.
@@ -133,7 +133,7 @@ impl Budget {
                     &values,
                     Some(state.starts.clone()),
                     &windows.training,
-                    CANDIDATE_ITERATIONS,
+                    CANDIDATE_ITERATIONS[usize::from(state.named.is_empty())],
                 );
                 let error = blocks(&alone.effects, None, &alone.parameters);
                 Some((effect, closed(steps.last()?, &error, &retuned)))
