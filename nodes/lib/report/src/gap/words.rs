@@ -40,9 +40,11 @@ fn size(name: &str, p: &EffectParameter) -> String {
     if !p.value.is_finite() {
         return format!("{name} none");
     }
-    let before = p.before.map_or_else(String::new, |before| format!(", before {}", significant(before, 3)));
+    let before = before(p);
     let unit = unit(p.unit);
-    let told = |end: f64| end.is_finite() && end.abs() <= WIDEST * p.value.abs();
+    // A size that has gone back to nothing is told against what it was.
+    let size = p.before.map_or(p.value.abs(), |before| p.value.abs().max(before.abs()));
+    let told = |end: f64| end.is_finite() && end.abs() <= WIDEST * size;
     let (value, range) = match (told(p.low), told(p.high)) {
         (true, true) => (with_interval(p.value, p.low, p.high).0, interval(p.low, p.high)),
         (true, false) => (significant(p.value, 3), format!("{} … {NOT_TOLD}", significant(p.low, 3))),
@@ -50,6 +52,11 @@ fn size(name: &str, p: &EffectParameter) -> String {
         (false, false) => return format!("{name} {NOT_TOLD}{before}"),
     };
     format!("{name} {value} ({range}){unit}{before}")
+}
+
+/// What the model handed over, or that of the drive before, has of it.
+fn before(p: &EffectParameter) -> String {
+    p.before.map_or_else(String::new, |before| format!(", before {}", significant(before, 3)))
 }
 
 /// The effects to list, at most so many: those named, then candidates by what they would close; the likeliest candidate is always among them.
@@ -98,7 +105,7 @@ pub(super) fn closes(fraction: &Estimate) -> String {
 pub(super) fn named(effect: &RankedEffect) -> String {
     let sizes = effect.parameters.iter().filter(|(_, p)| p.value.is_finite()).map(|(name, p)| {
         let (value, _) = with_interval(p.value, p.low, p.high);
-        format!("{} {value}{}", words(name), unit(p.unit))
+        format!("{} {value}{}{}", words(name), unit(p.unit), before(p))
     });
     format!("{} ({})", words(effect.name), sizes.collect::<Vec<_>>().join(", "))
 }
@@ -127,6 +134,8 @@ mod tests {
         assert_eq!(size_of(0.05, -3.758, 3.858, "1"), "c f not told");
         assert_eq!(size_of(1.9, 1.4, f64::INFINITY, "rad/s"), "c f 1.90 (1.40 … not told) rad/s");
         assert_eq!(size_of(f64::NAN, 0.0, 1.0, "1"), "c f none");
+        let gone = EffectParameter { value: 0.0, low: -0.0033, high: 0.0033, unit: "s", before: Some(0.04) };
+        assert_eq!(size("delay_s", &gone), "delay 0.0000 (−0.0033 … 0.0033) s, before 0.0400");
     }
 
     #[test]
