@@ -118,7 +118,8 @@ impl Claim {
         self.named && self.confidence < NEARLY_CERTAIN
     }
 
-    /// Takes the name from it if the held-out error with it is larger than that without; whether it did.
+    /// Takes the name from it if the held-out error with it is larger than that without; whether it did. What keeps its name is scored on the
+    /// same data: its share is a little too good, as a harmful one is not there to be stated.
     pub(crate) fn doubt_if_harmful(&mut self, with: f64, without: f64) -> bool {
         let harms = with > HARM * without;
         if harms {
