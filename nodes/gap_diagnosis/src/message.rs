@@ -1,7 +1,8 @@
 //! A diagnosis as a message: the summary of gap.json.
 
 use gripsight_bag::encode;
-use gripsight_gap::{Diagnosis, Estimate, Place, RankedEffect};
+use gripsight_diagnosis::{Diagnosis, Place, RankedEffect};
+use gripsight_estimation::Estimate;
 use gripsight_msgs::standard::std_msgs::Header;
 use gripsight_msgs::{GapEffect, GapParameter, GapRegion, GapReport, Handshake, Interval, MagicFormula};
 use gripsight_signals::{DataHealth, StateSequence};

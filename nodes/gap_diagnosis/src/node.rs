@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use gripsight_bag::Reassembler;
-use gripsight_gap::{Diagnosis, GapError, Request, diagnose};
+use gripsight_diagnosis::{Diagnosis, GapError, Request, diagnose};
 use gripsight_identification::export::stamp_text;
 use gripsight_identification::vehicle_hash;
 use gripsight_msgs::{

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use gripsight_gap::Diagnosis;
+use gripsight_diagnosis::Diagnosis;
 use gripsight_report::{GapInput, Header, gap_page};
 
 /// Writes the files; gives their folder.

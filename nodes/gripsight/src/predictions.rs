@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use gripsight_bag::{Bag, BagError, BagWriter, decode, encode, from_cdr};
-use gripsight_gap::Prediction;
+use gripsight_diagnosis::Prediction;
 use gripsight_msgs::standard::nav_msgs::Odometry;
 use gripsight_signals::{OdometrySample, StateSequence};
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The chance that an effect found is the cause: fits the coefficients of nodes/lib/gap/src/confidence.rs on development_claims.csv, and scores
+"""The chance that an effect found is the cause: fits the coefficients of nodes/lib/diagnosis/src/confidence.rs on development_claims.csv, and scores
 every track with a fit on the others. Needs NumPy and scikit-learn.
 
     fit_chance.py

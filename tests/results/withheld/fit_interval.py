@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The width of a size's interval: picks the constants of nodes/lib/gap/src/sizes.rs on development_sizes.csv, and scores every track with those
+"""The width of a size's interval: picks the constants of nodes/lib/diagnosis/src/sizes.rs on development_sizes.csv, and scores every track with those
 picked on the others. Needs Python alone.
 
     fit_interval.py

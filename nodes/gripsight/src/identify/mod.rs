@@ -13,7 +13,7 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use gripsight_bag::{ReadReport, TopicMap, read_sequences};
-use gripsight_gap::{ExtendedModelFile, without_effects};
+use gripsight_diagnosis::{ExtendedModelFile, without_effects};
 use gripsight_identification::export::{Provenance, TireFiles};
 use gripsight_identification::{
     self as identification, Config, FrictionPrior, Method, ResidualKind, identify,

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use gripsight_bag::TopicMap;
-use gripsight_gap::{Diagnosis, GapError, Request, diagnose};
+use gripsight_diagnosis::{Diagnosis, GapError, Request, diagnose};
 use gripsight_signals::StateSequence;
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 use gripsight_withheld_make::{COMMITMENT, files};

@@ -102,7 +102,7 @@ pub(crate) fn conclude(run: &Identification, converged: bool) -> Outcome {
     let rmse = |errors: fn(
         &TireRollout<'_>,
         &[f64; PARAMETERS],
-        &[crate::shooting::Window],
+        &[gripsight_model::Window],
         &[f64; 2],
     ) -> crate::judge::Errors| {
         let (b, a) = (errors(&rollout, &before, &test, &noise), errors(&rollout, &after, &test, &noise));

@@ -1,10 +1,10 @@
 //! Telemetry made ready for fitting: checked, cut into windows, and split into parts for fitting, choosing and judging.
 
+use gripsight_model::{Window, tile};
 use gripsight_signals::{DataHealth, Segment, StateSequence, segments};
 use gripsight_vehicle::VehicleParameters;
 
 use crate::IdentificationError;
-use crate::shooting::{Window, tile};
 
 /// What a window is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -16,6 +16,7 @@ mod prior;
 mod signals;
 mod weights;
 
+use gripsight_model::Window;
 use gripsight_vehicle::{GRAVITY_MPS2, MagicFormula, PacejkaParameters, SingleTrack, VehicleParameters};
 use nalgebra::DMatrix;
 
@@ -24,10 +25,10 @@ use crate::extract::extract;
 use crate::rollout::{
     NAMES, Nuisance, PARAMETERS, SIGNALS, TireRollout, corrections_of, nuisance_of, tires_of,
 };
-use crate::shooting::{Fit, Parameter, Prior, Problem, StopReason, TOLERANCE, Window, fit};
 use crate::sweep::Point;
 use crate::tires::{C_PRIOR, E_PRIOR, parameters};
 use crate::{FrictionPrior, IdentificationError, PerAxle, Range, SignalCorrections};
+use gripsight_estimation::shooting::{Fit, Parameter, Prior, Problem, StopReason, TOLERANCE, fit};
 
 pub(crate) use peak::{PeakEvidence, force_error};
 pub(crate) use prior::axle_sigma;

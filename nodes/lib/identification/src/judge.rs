@@ -2,7 +2,8 @@
 
 use crate::data::Data;
 use crate::rollout::{PARAMETERS, SIGNALS, TireRollout};
-use crate::shooting::{Parameter, Problem, Rollout, TOLERANCE, Window, fit};
+use gripsight_estimation::shooting::{Parameter, Problem, TOLERANCE, fit};
+use gripsight_model::{Rollout, Window};
 
 /// Root mean square errors over windows.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,7 +1,7 @@
 //! From a state sequence to Pacejka parameters: signal corrections, residual learning, virtual steering sweep, fit, acceptance.
 //!
 //! [`identify`] is the whole way; [`Identification`] and [`train_residual`] are its halves, which run in two nodes when live.
-//! [`shooting`] is the least-squares engine underneath; [`Monitor`] says when a set in use stops fitting.
+//! The least-squares engine underneath is `gripsight_estimation::shooting`; [`Monitor`] says when a set in use stops fitting.
 
 mod acceptance;
 mod candidate;
@@ -22,7 +22,6 @@ mod residual;
 mod residual_model;
 mod rollout;
 mod run;
-pub mod shooting;
 mod start;
 mod sweep;
 pub mod tires;

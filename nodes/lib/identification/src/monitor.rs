@@ -4,6 +4,7 @@
 //! both larger than its uncertainty and worth acting on is a notice; small corners tell nothing and give none. Where the change lies is where the
 //! windows before fit best with the old D and those after it with the new: a run that is told of a change leaves out what lies before it.
 
+use gripsight_model::Window;
 use gripsight_signals::{DataHealth, StateSequence};
 use gripsight_vehicle::VehicleParameters;
 use serde::Serialize;
@@ -11,9 +12,9 @@ use serde::Serialize;
 use crate::data::Data;
 use crate::judge::rollout_errors;
 use crate::rollout::{TireRollout, vector_of};
-use crate::shooting::{Parameter, Problem, TOLERANCE, Window, fit};
 use crate::tires::D_BOUNDS;
 use crate::{AcceptedSet, Estimate, FrictionPrior, IdentificationError, PerAxle, vehicle_hash};
+use gripsight_estimation::shooting::{Parameter, Problem, TOLERANCE, fit};
 
 /// Smallest change of D that is worth a notice, as a share of it.
 const NOTICEABLE: f64 = 0.08;

@@ -1,11 +1,11 @@
 //! What the report draws: tire curves with their band and the density of the data, and time series.
 
+use gripsight_model::{Rollout, Window};
 use gripsight_vehicle::{MagicFormula, PacejkaParameters, SingleTrack};
 
 use crate::direct::{Slips, covariance_of, force_error};
 use crate::judge::best_starts;
 use crate::rollout::{PARAMETERS, TireRollout, tires_of};
-use crate::shooting::{Rollout, Window};
 use crate::{Estimate, Identification, PerAxle, TireCurve, Trace};
 
 /// Points of a curve.

@@ -8,6 +8,7 @@
 //! min over x_0, e:  sum_k |y_k - y(x_0, e)_k|^2 / sigma^2,      dx/dt = f(x, u) + e/dt
 //! ```
 
+use gripsight_model::Window;
 use std::ops::ControlFlow;
 
 use gripsight_s4::{Normalization, ResidualNetwork, Sequence, TrainingConfig, TrainingSet, train};
@@ -19,7 +20,6 @@ use nalgebra::{Matrix4, Vector4};
 
 use crate::data::{Data, MIN_WINDOWS, Part, quantile};
 use crate::rollout::{delayed, substep_s};
-use crate::shooting::Window;
 use crate::{
     Candidate, Config, IdentificationError, Method, PerAxle, Range, ResidualKind, ResidualModel, RunKey,
     SignalCorrections, vehicle_hash,

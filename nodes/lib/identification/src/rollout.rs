@@ -17,11 +17,11 @@
 
 mod vector;
 
+use gripsight_model::{Rollout, Window};
 use gripsight_signals::Segment;
 use gripsight_vehicle::{GRAVITY_MPS2, Input, MagicFormula, Real, SingleTrack, State, VehicleParameters};
 
 use crate::data::Data;
-use crate::shooting::{Rollout, Window};
 
 pub use vector::Nuisance;
 pub(crate) use vector::{

@@ -2,8 +2,8 @@
 
 use gripsight_vehicle::{MagicFormula, PacejkaParameters};
 
-use crate::shooting::{Parameter, Prior};
 use crate::{PerAxle, Range};
+use gripsight_estimation::shooting::{Parameter, Prior};
 
 /// Normalised stiffness B C D, 1/rad. Road tires have 8-20, slicks under downforce up to 60, a 1:10 car on a dusty floor 2.
 pub const STIFFNESS_BOUNDS: (f64, f64) = (0.5, 100.0);

@@ -1,6 +1,6 @@
 //! Topics: how their messages are, what a diagnosis uses them for, and what it could not see without them.
 
-use gripsight_gap::{EffectId, Need};
+use gripsight_model::{EffectId, Need};
 use gripsight_signals::TopicHealth;
 use maud::{Markup, html};
 use serde::Serialize;

@@ -5,10 +5,12 @@
 
 use std::collections::BTreeMap;
 
-use gripsight_gap::{
-    Diagnosis, EffectParameter, Estimate, ExtendedModelFile, GapBudget, GapStep, Identity, Invisible, Need,
-    Place, Prediction, RankedEffect, Series, TirePair, Unexplained, Verdict, Where,
+use gripsight_diagnosis::{
+    Diagnosis, EffectParameter, ExtendedModelFile, GapBudget, GapStep, Invisible, Place, Prediction,
+    RankedEffect, Series, TirePair, Unexplained, Verdict, Where,
 };
+use gripsight_estimation::Estimate;
+use gripsight_model::{Identity, Need};
 use gripsight_report::{GapInput, Header, gap_page, gap_text, topic_notes};
 use gripsight_signals::{DataHealth, Pace, Spikes, TopicHealth};
 use gripsight_vehicle::PacejkaParameters;

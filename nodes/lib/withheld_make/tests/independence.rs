@@ -10,7 +10,14 @@ use std::path::{Path, PathBuf};
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
 
 /// Crates that model, identify or diagnose.
-const MODELS: [&str; 4] = ["gripsight_vehicle", "gripsight_identification", "gripsight_gap", "gripsight_s4"];
+const MODELS: [&str; 6] = [
+    "gripsight_vehicle",
+    "gripsight_model",
+    "gripsight_estimation",
+    "gripsight_identification",
+    "gripsight_diagnosis",
+    "gripsight_s4",
+];
 /// Crates that make cases.
 const MAKERS: [&str; 2] = ["gripsight_withheld_make", "gripsight_reference_car"];
 

@@ -5,9 +5,9 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::direct::{Slips, covariance_of};
 use crate::rollout::tires_of;
-use crate::shooting::Fit;
 use crate::tires::{C_PRIOR, D_BOUNDS, E_PRIOR};
 use crate::{Estimate, FrictionPrior};
+use gripsight_estimation::shooting::Fit;
 
 /// Whether an axle's peak shows in the data, and how well it is known then.
 #[derive(Debug, Clone, Copy, PartialEq)]

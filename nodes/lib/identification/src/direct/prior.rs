@@ -1,9 +1,9 @@
 //! The friction prior: where it has a say, and where the data contradict it.
 
 use crate::direct::peak::PeakEvidence;
-use crate::shooting::{Fit, Parameter, Prior};
 use crate::tires::{C_PRIOR, E_PRIOR};
 use crate::{FrictionPrior, PerAxle};
+use gripsight_estimation::shooting::{Fit, Parameter, Prior};
 
 /// D of an axle may lie off the road's friction by this share of it: load sensitivity and unlike wheel loads take 5 to 20 % on development draws.
 const ROAD_TO_AXLE: f64 = 0.1;

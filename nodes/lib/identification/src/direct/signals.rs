@@ -3,7 +3,7 @@
 use gripsight_vehicle::VehicleParameters;
 
 use crate::data::{Data, median};
-use crate::shooting::{Parameter, Prior};
+use gripsight_estimation::shooting::{Parameter, Prior};
 
 /// What is likely of the signals before the data are looked at: (mean, sigma, low, high) in the order of [`SignalCorrections`]; the lever
 /// arm in wheelbases, the bias of v_y in mean speeds.

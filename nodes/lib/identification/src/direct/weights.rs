@@ -2,7 +2,8 @@
 
 use crate::data::median;
 use crate::rollout::TireRollout;
-use crate::shooting::{Fit, Rollout, Window};
+use gripsight_estimation::shooting::Fit;
+use gripsight_model::{Rollout, Window};
 
 /// What residuals are divided by: the scatter of each channel about the fit (the median window's root mean square, at least the noise),
 /// times the root of their correlation length. Errors of the model are correlated; counted as independent they would overrule every prior.

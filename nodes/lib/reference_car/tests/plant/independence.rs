@@ -5,7 +5,14 @@ use std::collections::BTreeSet;
 use cargo_metadata::{DependencyKind, MetadataCommand};
 
 /// Crates that model, identify or diagnose.
-const TESTED: [&str; 4] = ["gripsight_vehicle", "gripsight_identification", "gripsight_gap", "gripsight_s4"];
+const TESTED: [&str; 6] = [
+    "gripsight_vehicle",
+    "gripsight_model",
+    "gripsight_estimation",
+    "gripsight_identification",
+    "gripsight_diagnosis",
+    "gripsight_s4",
+];
 
 #[test]
 fn it_depends_on_nothing_that_is_tested_on_it() {

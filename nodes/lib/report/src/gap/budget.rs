@@ -1,6 +1,7 @@
 //! The gap as bars: from the model as it came down to the noise.
 
-use gripsight_gap::{Diagnosis, Estimate};
+use gripsight_diagnosis::Diagnosis;
+use gripsight_estimation::Estimate;
 use maud::{Markup, html};
 
 use super::words::{channel_unit, figure, words};

@@ -7,7 +7,7 @@ mod terminal;
 mod verdict;
 mod words;
 
-use gripsight_gap::{Diagnosis, Verdict};
+use gripsight_diagnosis::{Diagnosis, Verdict};
 use gripsight_signals::TopicHealth;
 use maud::{Markup, html};
 

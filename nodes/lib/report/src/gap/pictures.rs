@@ -1,6 +1,6 @@
 //! The pictures of a diagnosis.
 
-use gripsight_gap::{Diagnosis, Place, Prediction};
+use gripsight_diagnosis::{Diagnosis, Place, Prediction};
 use maud::{Markup, html};
 
 use crate::chart::heat as heat_color;

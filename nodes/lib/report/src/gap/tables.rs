@@ -1,6 +1,6 @@
 //! Tables of a diagnosis.
 
-use gripsight_gap::{Diagnosis, Place};
+use gripsight_diagnosis::{Diagnosis, Place};
 use gripsight_signals::TopicHealth;
 use gripsight_vehicle::MagicFormula;
 use maud::{Markup, html};

@@ -2,7 +2,8 @@
 
 use std::fmt::Write;
 
-use gripsight_gap::{Diagnosis, Estimate, Place, Verdict};
+use gripsight_diagnosis::{Diagnosis, Place, Verdict};
+use gripsight_estimation::Estimate;
 
 use super::verdict::sentence;
 use super::words::{closes, figure, listed, sizes, unit, words};

@@ -1,6 +1,6 @@
 //! The verdict as a sentence: the same at the head of the page and on the terminal.
 
-use gripsight_gap::{Diagnosis, Verdict};
+use gripsight_diagnosis::{Diagnosis, Verdict};
 
 use super::words::{closes, named};
 use crate::page::Tone;

@@ -1,6 +1,7 @@
 //! Names and sizes as people read them, on the page and on the terminal.
 
-use gripsight_gap::{Diagnosis, EffectParameter, Estimate, RankedEffect};
+use gripsight_diagnosis::{Diagnosis, EffectParameter, RankedEffect};
+use gripsight_estimation::Estimate;
 
 use crate::text::{estimate_of, interval, percent, percent_estimate, significant, with_interval};
 

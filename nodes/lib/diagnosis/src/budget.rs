@@ -1,0 +1,271 @@
+//! How large the gap is, step by step, on data that no model was fitted to.
+
+use gripsight_estimation::{
+    Estimate, HORIZON_S, Split, Windows, bootstrap, by_block, interval, mean, of_length, of_picked, split,
+};
+use gripsight_model::{EffectId, ExtendedModel, Flexible, Recording, Room, WINDOW_S};
+use std::collections::BTreeMap;
+
+use crate::engine::Engine;
+use crate::outcome::{GapBudget, GapStep};
+use crate::residual::Residual;
+use crate::select::Round;
+use crate::state::{Nominal, State};
+
+/// Errors of the models on the scored blocks.
+#[derive(Debug, Clone)]
+pub(crate) struct Budget {
+    pub(crate) nominal: Vec<(f64, f64)>,
+    /// Retuned tires, then with one effect after the other.
+    pub(crate) steps: Vec<Vec<(f64, f64)>>,
+    /// Those effects.
+    named: Vec<EffectId>,
+    pub(crate) ceiling: Vec<(f64, f64)>,
+    /// Retuned tires and a residual network; nothing where it could not be trained.
+    residual: Option<Vec<(f64, f64)>>,
+    pub(crate) floor: Estimate,
+    pub(crate) closed: Estimate,
+    pub(crate) scored_on: &'static str,
+    /// What the effects found but not named, and the best of those that were not found, would close beside the named.
+    candidates: Vec<(EffectId, Estimate)>,
+}
+
+/// The models that are scored.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Models<'m> {
+    /// Parameters as they came.
+    pub(crate) nominal: &'m Nominal,
+    /// Tires retuned.
+    pub(crate) null: &'m State,
+    /// With the effects named.
+    pub(crate) state: &'m State,
+    /// With all that the search found.
+    pub(crate) found: &'m State,
+    /// The look at what else there is beside the effects named.
+    pub(crate) others: &'m Round,
+}
+
+/// What models are scored on: the held-out blocks, or another bag.
+#[derive(Debug, Clone)]
+pub(crate) struct Scorer<'a> {
+    engine: Engine<'a>,
+    windows: Windows,
+    scored_on: &'static str,
+    held_out: bool,
+}
+
+impl<'a> Scorer<'a> {
+    pub(crate) fn new(engine: &Engine<'a>, other: Option<&'a Recording>, windows: &Split) -> Self {
+        match other {
+            // The other bag has its own noise; models and weights are those fitted here.
+            Some(recording) => Self {
+                engine: Engine { recording, ..engine.clone() },
+                windows: of_length(recording, &split(recording, false).training, HORIZON_S),
+                scored_on: "another bag",
+                held_out: true,
+            },
+            None if windows.held_out.windows.is_empty() => Self {
+                engine: engine.clone(),
+                windows: of_length(engine.recording, &windows.training, HORIZON_S),
+                scored_on: "training blocks (too little data to hold any out)",
+                held_out: false,
+            },
+            None => Self {
+                engine: engine.clone(),
+                windows: windows.held_out.clone(),
+                scored_on: "held-out blocks",
+                held_out: true,
+            },
+        }
+    }
+
+    /// Mean squared error of a model over the noise.
+    pub(crate) fn error(&self, state: &State) -> f64 {
+        let score = self.engine.score(&state.effects, None, &state.parameters, &self.windows);
+        mean(&by_block(self.engine.recording, &self.windows, &score))
+    }
+
+    /// What sizes are compared on: the held-out data in windows as they are fitted. Nothing where no data are held out.
+    pub(crate) fn apart(&self) -> Option<(&Engine<'a>, Windows)> {
+        self.held_out.then(|| (&self.engine, of_length(self.engine.recording, &self.windows, WINDOW_S)))
+    }
+}
+
+/// Iterations of the fits of the steps between, and of what else was tried: where nothing is named, candidates are all there is to see.
+const STEP_ITERATIONS: usize = 7;
+const CANDIDATE_ITERATIONS: [usize; 2] = [4, 20];
+/// How many of the effects that were not found are scored.
+const CANDIDATES: usize = 3;
+/// An interval of a share that is wider says nothing.
+const WIDEST_SHARE: f64 = 2.0;
+
+impl Budget {
+    /// Scores the models.
+    pub(crate) fn of(engine: &Engine<'_>, scorer: &Scorer<'_>, windows: &Split, models: &Models<'_>) -> Self {
+        let Models { nominal, null, state, found, others } = *models;
+        let Scorer { engine: scorer, windows: on, scored_on, .. } = scorer;
+        let blocks = |effects: &[EffectId], flexible: Option<&Flexible>, p: &[f64]| {
+            by_block(scorer.recording, on, &scorer.score(effects, flexible, p, on))
+        };
+        let retuned = blocks(&null.effects, None, &null.parameters);
+        let mut steps = vec![retuned.clone()];
+        for count in 1..state.named.len() {
+            let named = &state.named[..count];
+            let values = engine.carry(state, named);
+            let step =
+                engine.look(named, &values, Some(state.starts.clone()), &windows.training, STEP_ITERATIONS);
+            steps.push(blocks(&step.effects, None, &step.parameters));
+        }
+        if !state.named.is_empty() {
+            steps.push(blocks(&state.effects, None, &state.parameters));
+        }
+        let unnamed = found.named.iter().filter(|e| !state.named.contains(e)).map(|&e| (e, found));
+        let others = others.refits.iter().filter(|r| !found.named.contains(&r.effect));
+        let candidates = unnamed
+            .chain(others.take(CANDIDATES).map(|r| (r.effect, &r.state)))
+            .filter_map(|(effect, fitted)| {
+                let named = [&state.named[..], &[effect]].concat();
+                let values = engine.carry(fitted, &named);
+                let alone = engine.look(
+                    &named,
+                    &values,
+                    Some(state.starts.clone()),
+                    &windows.training,
+                    CANDIDATE_ITERATIONS[usize::from(state.named.is_empty())],
+                );
+                let error = blocks(&alone.effects, None, &alone.parameters);
+                Some((effect, closed(steps.last()?, &error, &retuned)))
+            })
+            .collect();
+        let slip = large_slip_rad(engine, null, &windows.training);
+        let flexible = Flexible::new(engine.recording, slip, engine.vehicle.wheelbase_m(), &Room::ALL);
+        let (ceiling, residual) = rayon::join(
+            || engine.fit_flexible(state, &flexible, &windows.training),
+            || Residual::learned(engine, null, &windows.training),
+        );
+        let residual = residual.map(|residual| {
+            let model = ExtendedModel { residual: Some(&residual), ..scorer.model(&null.effects, None) };
+            by_block(scorer.recording, on, &scorer.score_model(&model, &null.parameters, on))
+        });
+        let whole = match steps.last() {
+            Some(last) if steps.len() > 1 => closed(&retuned, last, &retuned),
+            _ => Estimate::default(),
+        };
+        Self {
+            nominal: blocks(&nominal.effects, None, &nominal.parameters),
+            ceiling: blocks(&state.effects, Some(&flexible), &ceiling),
+            residual,
+            steps,
+            named: state.named.clone(),
+            // By construction of the noise's figure the floor is 1.
+            floor: Estimate { value: 1.0, low: 1.0, high: 1.0 },
+            closed: whole,
+            scored_on,
+            candidates,
+        }
+    }
+
+    pub(crate) fn retuned(&self) -> f64 {
+        self.steps.first().map_or(f64::NAN, |b| mean(b))
+    }
+
+    pub(crate) fn after(&self) -> f64 {
+        self.steps.last().map_or(f64::NAN, |b| mean(b))
+    }
+
+    /// What the effect taken as number `step`, from 1, closes after those before it.
+    pub(crate) fn closed_by_step(&self, step: usize) -> Estimate {
+        match (self.steps.get(step - 1), self.steps.get(step), self.steps.first()) {
+            (Some(from), Some(to), Some(retuned)) => closed(from, to, retuned),
+            _ => Estimate::UNKNOWN,
+        }
+    }
+
+    /// What an effect that was not named would close beside those that were.
+    pub(crate) fn closed_by_candidate(&self, effect: EffectId) -> Estimate {
+        self.candidates.iter().find(|c| c.0 == effect).map_or(Estimate::UNKNOWN, |c| c.1)
+    }
+
+    /// As the result states it.
+    pub(crate) fn stated(&self, recording: &Recording) -> GapBudget {
+        let channel_noise: BTreeMap<&'static str, f64> = recording
+            .channels
+            .iter()
+            .zip(&recording.sigma)
+            .filter(|(c, _)| c.scored())
+            .map(|(c, s)| (c.name(), *s))
+            .collect();
+        let after = self.steps.last().map_or(Estimate::UNKNOWN, |b| interval(b));
+        let ceiling = interval(&self.ceiling);
+        let steps = self.named.iter().zip(self.steps.iter().skip(1));
+        GapBudget {
+            nominal: interval(&self.nominal),
+            retuned: self.steps.first().map_or(Estimate::UNKNOWN, |b| interval(b)),
+            steps: steps.map(|(e, blocks)| GapStep { effect: e.name(), error: interval(blocks) }).collect(),
+            after,
+            unstructured_ceiling: if ceiling.value > after.value { after } else { ceiling },
+            s4_residual: self.residual.as_deref().map_or(Estimate::UNKNOWN, interval),
+            noise_floor: self.floor,
+            horizon_s: HORIZON_S,
+            channel_noise,
+            scored_on: self.scored_on,
+        }
+    }
+}
+
+/// (from - to)/(retuned - floor), with its interval over blocks; unknown where the gap's own interval reaches down to the noise, or
+/// the share's is wider than twice the gap.
+fn closed(from: &[(f64, f64)], to: &[(f64, f64)], retuned: &[(f64, f64)]) -> Estimate {
+    let gap = bootstrap(retuned.len(), |picked| of_picked(retuned, picked) - 1.0);
+    if gap.low.is_nan() || gap.low <= 0.0 {
+        return Estimate::UNKNOWN;
+    }
+    let share = bootstrap(retuned.len(), |picked| {
+        let whole = (of_picked(retuned, picked) - 1.0).max(1e-3);
+        (of_picked(from, picked) - of_picked(to, picked)) / whole
+    });
+    if share.high - share.low <= WIDEST_SHARE { share } else { Estimate::UNKNOWN }
+}
+
+/// A large slip angle of the recording on the fitted tires.
+pub(crate) fn large_slip_rad(engine: &Engine<'_>, null: &State, windows: &Windows) -> f64 {
+    let car = gripsight_vehicle::SingleTrack::new(engine.vehicle, &null.tires());
+    let mut slips = Vec::new();
+    for w in &windows.windows {
+        let run = &engine.recording.runs[w.segment];
+        for k in (w.from..w.from + w.len).step_by(5) {
+            let state =
+                gripsight_vehicle::State { v_y_mps: run.smooth[0][k], yaw_rate_radps: run.smooth[1][k] };
+            let input =
+                gripsight_vehicle::Input { v_x_mps: run.v_x_mps[k], steering_rad: run.steering_rad[k] };
+            let (f, r) = car.slip_angles_rad(&state, &input);
+            slips.push(f.abs().max(r.abs()));
+        }
+    }
+    gripsight_model::quantile(slips, 0.8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn blocks(means: &[f64]) -> Vec<(f64, f64)> {
+        means.iter().map(|m| (100.0 * m, 100.0)).collect()
+    }
+
+    #[test]
+    fn a_share_is_stated_only_of_a_gap_that_is_clear() {
+        let retuned = blocks(&[9.0, 11.0, 10.0, 12.0, 8.0, 10.0]);
+        let after = blocks(&[2.8, 3.2, 3.0, 3.1, 2.9, 3.0]);
+        let clear = closed(&retuned, &after, &retuned);
+        approx::assert_relative_eq!(clear.value, 7.0 / 9.0, epsilon = 1e-12);
+        assert!(clear.low < clear.value && clear.value < clear.high && clear.high < 1.0);
+        // No gap, a gap that sits in one block, and a model that runs off in one block.
+        let none = blocks(&[0.9, 1.1, 1.0, 1.05, 0.95, 1.0]);
+        let one_place = blocks(&[1.0, 1.0, 1.0, 1.0, 1.0, 90.0]);
+        let runs_off = blocks(&[3.0, 3.0, 3.0, 3.0, 3.0, 500.0]);
+        for (to, whole) in [(&none, &none), (&after, &one_place), (&runs_off, &retuned)] {
+            assert!(closed(whole, to, whole).value.is_nan());
+        }
+    }
+}

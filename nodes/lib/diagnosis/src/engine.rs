@@ -1,0 +1,320 @@
+//! One engine for everything that is fitted or scored: the extended model on windows with free starts.
+
+use gripsight_estimation::shooting;
+use gripsight_estimation::shooting::{Descent, Fit, Linearization, Parameter, Problem, StopReason};
+use gripsight_estimation::{Score, Windows};
+use gripsight_model::{
+    BASE, EffectId, ExtendedModel, Flexible, ParameterSpec, Recording, Window, tires_to_parameters,
+};
+use gripsight_vehicle::{PacejkaParameters, VehicleParameters, handling};
+
+use crate::priors::BACKGROUND;
+use crate::state::{Nominal, State};
+use crate::trust::TireTrust;
+
+/// Windows whose mean square is beyond this many sigma count less and less.
+pub(crate) const ROBUST_K: f64 = 3.0;
+
+/// Relative change of the cost under which a fit has converged: a hundredth of the least drop that an effect must bring.
+const TOLERANCE: f64 = 1e-5;
+
+/// Standard deviation that parameters of flexible terms are expected to have.
+pub(crate) const FLEXIBLE_RIDGE: f64 = 1.0;
+
+/// Effects with their parameters, as they are fitted.
+pub(crate) type Sized = Vec<(EffectId, Vec<f64>)>;
+
+/// What all fits share.
+#[derive(Debug, Clone)]
+pub(crate) struct Engine<'a> {
+    pub(crate) recording: &'a Recording,
+    pub(crate) vehicle: &'a VehicleParameters,
+    pub(crate) nominal: PacejkaParameters,
+    /// Effects that the nominal model has: held at their sizes until they are claimed.
+    pub(crate) held: Sized,
+    /// What the nominal model has of the background.
+    pub(crate) usual: Sized,
+    pub(crate) trust: TireTrust,
+    /// Weights of the channels: what residuals are divided by when fitting.
+    pub(crate) sigma: Vec<f64>,
+    /// 0 for a 1:10 car, 1 for a full-size one: where between the two sizes of an effect this car lies.
+    pub(crate) size_place: f64,
+    pub(crate) substep_s: f64,
+}
+
+/// How long a substep may be: a share of the fastest time constant of the car.
+fn substep_s(vehicle: &VehicleParameters, tires: &PacejkaParameters, v_x_mps: f64) -> f64 {
+    const LONGEST_S: f64 = 0.005;
+    const SHORTEST_S: f64 = 0.002;
+    const SHARE: f64 = 0.12;
+    let (k_f, k_r) = handling::cornering_stiffness_n_per_rad(vehicle, tires);
+    let (l_f, l_r) = (vehicle.l_f_m, vehicle.l_r_m);
+    let lateral = (k_f + k_r) / (vehicle.mass_kg * v_x_mps);
+    let yaw = (k_f * l_f * l_f + k_r * l_r * l_r) / (vehicle.yaw_inertia_kgm2 * v_x_mps);
+    (SHARE / lateral.max(yaw)).clamp(SHORTEST_S, LONGEST_S)
+}
+
+/// Values at which an effect is absent.
+fn null_values(effect: EffectId) -> Vec<f64> {
+    effect.spec().parameters.iter().map(|p| p.null).collect()
+}
+
+impl<'a> Engine<'a> {
+    pub(crate) fn new(
+        recording: &'a Recording,
+        vehicle: &'a VehicleParameters,
+        nominal: PacejkaParameters,
+        trust: TireTrust,
+    ) -> Self {
+        let v_x_mps = recording.typical_speed_mps().max(0.5);
+        Self {
+            recording,
+            vehicle,
+            nominal,
+            held: Vec::new(),
+            usual: Vec::new(),
+            trust,
+            sigma: recording.weights.clone(),
+            size_place: ((vehicle.wheelbase_m() / 0.32).ln() / (3.0_f64 / 0.32).ln()).clamp(0.0, 1.0),
+            substep_s: substep_s(vehicle, &nominal, v_x_mps),
+        }
+    }
+
+    /// A size of the parameter that matters on this car.
+    pub(crate) fn size(&self, spec: &ParameterSpec) -> f64 {
+        spec.size[0] * (spec.size[1] / spec.size[0]).powf(self.size_place)
+    }
+
+    /// Tires and hold of the nominal model.
+    fn nominal_base(&self) -> Vec<f64> {
+        let mut p = tires_to_parameters(&self.nominal).to_vec();
+        p.push(0.5 * self.recording.dt_s());
+        p
+    }
+
+    /// The nominal model as it was handed over: its effects and all its parameters.
+    pub(crate) fn nominal_model(&self) -> Nominal {
+        let mut parameters = self.nominal_base();
+        let given = || self.usual.iter().chain(&self.held);
+        parameters.extend(given().flat_map(|(_, own)| own));
+        Nominal { effects: given().map(|(e, _)| *e).collect(), parameters }
+    }
+
+    /// The parameters with which the nominal model has an effect, where it has it.
+    pub(crate) fn given(&self, effect: EffectId) -> Option<&[f64]> {
+        let given = self.held.iter().chain(&self.usual).find(|(e, _)| *e == effect);
+        given.map(|(_, own)| own.as_slice())
+    }
+
+    /// The parameters that stand for the effect's absence among the claims: those of the nominal model where it has the effect, else its null.
+    pub(crate) fn absent(&self, effect: EffectId) -> Vec<f64> {
+        self.given(effect).map_or_else(|| null_values(effect), <[f64]>::to_vec)
+    }
+
+    pub(crate) fn holds(&self, effect: EffectId) -> bool {
+        self.held.iter().any(|(e, _)| *e == effect)
+    }
+
+    /// The nominal model, with its background in place to be fitted.
+    pub(crate) fn blank(&self) -> Vec<f64> {
+        let mut p = self.nominal_base();
+        p.extend(self.layout(&[]).into_iter().flat_map(|e| self.absent(e)));
+        p
+    }
+
+    /// The effects of a model that claims `named`, in the order of its parameters.
+    pub(crate) fn layout(&self, named: &[EffectId]) -> Vec<EffectId> {
+        let background = BACKGROUND.into_iter().filter(|e| !self.holds(*e));
+        let held = self.held.iter().map(|(e, _)| *e);
+        let silent = background.chain(held).filter(|e| !named.contains(e));
+        silent.chain(named.iter().copied()).collect()
+    }
+
+    /// The parameters of a state, for a model that claims `named`; what the state lacks is absent, and what is handed over and not claimed is as it
+    /// was handed over.
+    pub(crate) fn carry(&self, state: &State, named: &[EffectId]) -> Vec<f64> {
+        let mut values = state.parameters[..BASE].to_vec();
+        for effect in self.layout(named) {
+            let is_fixed = self.holds(effect) && !named.contains(&effect);
+            match state.of(effect).filter(|_| !is_fixed) {
+                Some(own) => values.extend(own),
+                None => values.extend(self.absent(effect)),
+            }
+        }
+        values
+    }
+
+    pub(crate) fn model(&self, effects: &[EffectId], flexible: Option<&Flexible>) -> ExtendedModel<'a> {
+        let mut model = ExtendedModel::new(self.recording, self.vehicle, effects, self.substep_s);
+        model.flexible = flexible.cloned();
+        model
+    }
+
+    pub(crate) fn problem<'p>(
+        &'p self,
+        model: &'p ExtendedModel<'a>,
+        windows: &'p [Window],
+        parameters: &'p [Parameter],
+        max_iterations: usize,
+    ) -> Problem<'p, ExtendedModel<'a>> {
+        Problem {
+            model,
+            windows,
+            sigma: &self.sigma,
+            parameters,
+            robust_k: ROBUST_K,
+            tolerance: TOLERANCE,
+            max_iterations,
+        }
+    }
+
+    /// Fits the tires, the background and the effects claimed together; `values` in the order of [`Self::layout`].
+    pub(crate) fn fit(
+        &self,
+        named: &[EffectId],
+        values: &[f64],
+        starts: Option<Vec<[f64; 2]>>,
+        windows: &Windows,
+        max_iterations: usize,
+    ) -> State {
+        self.fitted(named, values, windows, max_iterations, |problem| {
+            let fit = shooting::fit(problem, starts);
+            let end = Descent {
+                parameters: fit.parameters.clone(),
+                starts: fit.starts.clone(),
+                at: fit.linearization.evaluation(),
+                stop: fit.stop,
+                iterations: fit.iterations,
+            };
+            (end, Some(Box::new(fit)))
+        })
+    }
+
+    /// [`Self::fit`] without the derivatives at its end.
+    pub(crate) fn look(
+        &self,
+        named: &[EffectId],
+        values: &[f64],
+        starts: Option<Vec<[f64; 2]>>,
+        windows: &Windows,
+        max_iterations: usize,
+    ) -> State {
+        let descend = |problem: &Problem<'_, _>| (shooting::descend(problem, starts), None);
+        self.fitted(named, values, windows, max_iterations, descend)
+    }
+
+    fn fitted(
+        &self,
+        named: &[EffectId],
+        values: &[f64],
+        windows: &Windows,
+        max_iterations: usize,
+        solve: impl FnOnce(&Problem<'_, ExtendedModel<'a>>) -> (Descent, Option<Box<Fit>>),
+    ) -> State {
+        let effects = self.layout(named);
+        let model = self.model(&effects, None);
+        let parameters = self.parameters(named, &effects, values, 1.0);
+        let (end, fit) = solve(&self.problem(&model, &windows.windows, &parameters, max_iterations));
+        State {
+            named: named.to_vec(),
+            effects,
+            free: (0..parameters.len()).filter(|&j| parameters[j].free).collect(),
+            parameters: end.parameters,
+            starts: end.starts,
+            cost: end.at.cost,
+            window_costs: end.at.window_costs,
+            residuals: end.at.residuals as f64,
+            finite: end.stop != StopReason::NotFinite,
+            fit,
+        }
+    }
+
+    /// The cost of a state, per residual, as this engine counts it.
+    pub(crate) fn cost(&self, state: &State, windows: &Windows) -> f64 {
+        let model = self.model(&state.effects, None);
+        let parameters = self.parameters(&state.named, &state.effects, &state.parameters, 1.0);
+        let problem = self.problem(&model, &windows.windows, &parameters, 0);
+        let at = shooting::evaluate(&problem, &state.parameters, &state.starts);
+        at.cost / at.residuals as f64
+    }
+
+    /// Fits flexible terms on top of a state, whose own parameters stay: an upper bound of what an additive term explains.
+    pub(crate) fn fit_flexible(&self, state: &State, flexible: &Flexible, windows: &Windows) -> Vec<f64> {
+        const STEPS: usize = 2;
+        let model = self.model(&state.effects, Some(flexible));
+        let mut values = state.parameters.clone();
+        values.extend(std::iter::repeat_n(0.0, flexible.parameters()));
+        let mut parameters = self.parameters(&state.named, &state.effects, &values, FLEXIBLE_RIDGE);
+        let own = state.parameters.len();
+        parameters[..own].iter_mut().for_each(|p| p.free = false);
+        let problem = self.problem(&model, &windows.windows, &parameters, STEPS);
+        shooting::descend(&problem, Some(state.starts.clone())).parameters
+    }
+
+    /// One Jacobian of all parameters of a model.
+    pub(crate) fn linearize(
+        &self,
+        named: &[EffectId],
+        effects: &[EffectId],
+        values: &[f64],
+        starts: &[[f64; 2]],
+        windows: &Windows,
+    ) -> Linearization {
+        let model = self.model(effects, None);
+        let parameters = self.parameters(named, effects, values, 1.0);
+        shooting::linearize(&self.problem(&model, &windows.windows, &parameters, 0), values, starts)
+    }
+
+    /// Half the derivative of the cost by one parameter of a model, and the information on it, all others fixed.
+    pub(crate) fn slope(
+        &self,
+        effects: &[EffectId],
+        values: &[f64],
+        place: usize,
+        starts: &[[f64; 2]],
+        windows: &Windows,
+    ) -> (f64, f64) {
+        let model = self.model(effects, None);
+        let mut parameters = self.parameters(effects, effects, values, 1.0);
+        parameters.iter_mut().enumerate().for_each(|(j, p)| p.free = j == place);
+        let problem = self.problem(&model, &windows.windows, &parameters, 0);
+        let here = shooting::linearize(&problem, values, starts);
+        (here.gradient[0], here.information[(0, 0)])
+    }
+
+    /// Best starts for fixed parameters, and the plain sum of squares of each window in units of the noise.
+    pub(crate) fn score(
+        &self,
+        effects: &[EffectId],
+        flexible: Option<&Flexible>,
+        values: &[f64],
+        windows: &Windows,
+    ) -> Score {
+        self.score_model(&self.model(effects, flexible), values, windows)
+    }
+
+    /// [`Self::score`] of a model at hand.
+    pub(crate) fn score_model(&self, model: &ExtendedModel<'_>, values: &[f64], windows: &Windows) -> Score {
+        let parameters: Vec<Parameter> = values
+            .iter()
+            .map(|&start| Parameter {
+                start,
+                low: f64::NEG_INFINITY,
+                high: f64::INFINITY,
+                free: false,
+                prior: None,
+            })
+            .collect();
+        let problem = Problem {
+            model,
+            windows: &windows.windows,
+            sigma: &self.recording.sigma,
+            parameters: &parameters,
+            robust_k: f64::INFINITY,
+            tolerance: TOLERANCE,
+            max_iterations: 6,
+        };
+        let end = shooting::descend(&problem, None);
+        Score { squares: end.at.window_costs, starts: end.starts }
+    }
+}

@@ -1,0 +1,130 @@
+//! What is known beforehand: bounds and priors of all parameters, and what any car has a little of.
+
+use gripsight_estimation::shooting::{Parameter, Prior};
+use gripsight_model::{BASE, EffectId, HOLD, TIRES, tires_to_parameters};
+
+use crate::engine::Engine;
+use crate::state::State;
+use crate::trust::TireTrust;
+
+/// Bounds of (B C D, C, D, E).
+const TIRE_BOUNDS: [[f64; 2]; 4] = [[1.5, 80.0], [1.0, 2.3], [0.1, 3.0], [-4.0, 0.98]];
+/// Effects are expected within this many of their sizes.
+const PRIOR_SIZES: f64 = 3.0;
+/// Trust in the tires is one observation beside thousands of residuals, but the errors of a model within a window are all alike: so many
+/// residuals count as one when they argue against that trust.
+const RESIDUALS_PER_OBSERVATION: f64 = 30.0;
+/// What any real car does a little of: fitted beside the tires, within what is usual.
+pub(crate) const BACKGROUND: [EffectId; 5] = [
+    EffectId::TireRelaxation,
+    EffectId::LateralLoadTransfer,
+    EffectId::LongitudinalLoadTransfer,
+    EffectId::CombinedSlip,
+    EffectId::YawInertiaError,
+];
+/// What is usual, as a share of the wheel's radius (relaxation), of the height of the centre of gravity (longitudinal transfer), and of a
+/// size that matters (the others; of the yaw inertia, which is seldom measured, a tenth).
+const USUAL: [f64; 5] = [0.33, 0.27, 0.33, 0.14, 0.67];
+
+impl Engine<'_> {
+    /// How far a state's tires lie from those handed over: root of the mean square in units of the trust.
+    pub(crate) fn tire_shift(&self, state: &State) -> f64 {
+        let trusted = self.parameters(&[], &[], &state.parameters[..BASE], 1.0);
+        let squares = trusted
+            .iter()
+            .filter_map(|p| p.prior.map(|prior| ((p.start - prior.mean) / prior.sigma).powi(2)));
+        let tighter = if self.trust == TireTrust::free() { 1.0 } else { RESIDUALS_PER_OBSERVATION };
+        (squares.sum::<f64>() / tighter / TIRES as f64).sqrt()
+    }
+
+    /// How much of an effect this car may well have without anything being the matter; `None` of those that are no background.
+    pub(crate) fn usual(&self, effect: EffectId) -> Option<f64> {
+        if self.holds(effect) {
+            return None;
+        }
+        let place = BACKGROUND.iter().position(|e| *e == effect)?;
+        let size = self.size(&effect.spec().parameters[0]);
+        let scale = match effect {
+            EffectId::TireRelaxation => self.vehicle.wheel_radius_m.unwrap_or(0.6 * size),
+            EffectId::LongitudinalLoadTransfer => self.vehicle.h_cg_m,
+            _ => size,
+        };
+        Some(USUAL[place] * scale)
+    }
+
+    /// Bounds and priors of all parameters of a model; `values` is where a fit starts.
+    pub(crate) fn parameters(
+        &self,
+        named: &[EffectId],
+        effects: &[EffectId],
+        values: &[f64],
+        ridge: f64,
+    ) -> Vec<Parameter> {
+        let mean = tires_to_parameters(&self.nominal);
+        let trust = &self.trust;
+        let tighter = if self.trust == TireTrust::free() { 1.0 } else { RESIDUALS_PER_OBSERVATION.sqrt() };
+        let mut out: Vec<Parameter> = (0..TIRES)
+            .map(|j| {
+                let [low, high] = TIRE_BOUNDS[j % 4];
+                let sigma = match j % 4 {
+                    0 => trust.stiffness * mean[j],
+                    1 => trust.shape,
+                    2 => trust.peak * mean[j],
+                    _ => trust.curvature,
+                };
+                Parameter {
+                    start: values[j],
+                    low,
+                    high,
+                    free: true,
+                    prior: Some(Prior { mean: mean[j], sigma: sigma / tighter }),
+                }
+            })
+            .collect();
+        let dt_s = self.recording.dt_s();
+        // A command that is late is a command, and held until the next; a measured angle is neither.
+        let commanded = effects.iter().any(|e| matches!(e, EffectId::SteeringDelay | EffectId::SteeringLag));
+        out.push(Parameter {
+            start: if commanded { 0.5 * dt_s } else { values[HOLD] },
+            low: 0.0,
+            high: 0.5 * dt_s,
+            free: !commanded,
+            prior: None,
+        });
+        for effect in effects {
+            let claimed = named.contains(effect);
+            let usual = self.usual(*effect).filter(|_| !claimed);
+            for (spec, absent) in effect.spec().parameters.iter().zip(self.absent(*effect)) {
+                let size = self.size(spec);
+                let place = out.len();
+                if self.holds(*effect) && !claimed {
+                    let start = values[place];
+                    out.push(Parameter { start, low: start, high: start, free: false, prior: None });
+                    continue;
+                }
+                if let Some(usual) = usual {
+                    out.push(Parameter {
+                        start: values[place],
+                        low: spec.null + (spec.range[0] * size).max(-usual),
+                        high: spec.null + usual,
+                        free: true,
+                        prior: Some(Prior { mean: absent, sigma: usual }),
+                    });
+                    continue;
+                }
+                out.push(Parameter {
+                    start: values[place],
+                    low: spec.null + spec.range[0] * size,
+                    high: spec.null + spec.range[1] * size,
+                    free: true,
+                    prior: Some(Prior { mean: absent, sigma: PRIOR_SIZES * size }),
+                });
+            }
+        }
+        for &start in &values[out.len()..] {
+            let prior = Some(Prior { mean: 0.0, sigma: ridge });
+            out.push(Parameter { start, low: -1e3, high: 1e3, free: true, prior });
+        }
+        out
+    }
+}

@@ -1,0 +1,156 @@
+//! The diagnosis on the reference car, which shares no model with it.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::{drive, drive_at, nominal, text};
+use gripsight_diagnosis::{Diagnosis, Earlier, GapError, Request, Verdict, diagnose};
+use gripsight_model::ModelError;
+use gripsight_reference_car::CarParameters;
+use gripsight_signals::StateSequence;
+
+const DURATION_S: f64 = 30.0;
+
+fn car() -> CarParameters {
+    CarParameters::by_name("formula_student").unwrap()
+}
+
+fn diagnosed(recording: &StateSequence, without: &[String]) -> Diagnosis {
+    let vehicle = nominal(&car());
+    let request = Request { without, ..Request::new(recording, &vehicle) };
+    diagnose(&request, &mut |_| {}).unwrap()
+}
+
+fn named(d: &Diagnosis) -> Vec<&'static str> {
+    d.effects.iter().filter(|e| e.accepted).map(|e| e.name).collect()
+}
+
+#[test]
+fn a_clear_effect_is_named_with_its_size_and_closes_the_gap() {
+    let recording = drive(&car(), &["tire_relaxation=0.45"], DURATION_S, 21).unwrap();
+    let d = diagnosed(&recording, &[]);
+    assert_eq!((d.verdict, named(&d)[0]), (Verdict::Effects, "tire_relaxation"), "{}", text(&d));
+    let sigma_m = d.effects[0].parameters["sigma_m"].value;
+    assert!((sigma_m - 0.45).abs() < 0.05, "sigma {sigma_m} m, true 0.45 m");
+    assert!(d.gap_closed_fraction.value > 0.7, "{}", text(&d));
+    assert!(d.gap.noise_floor.value <= d.gap.after.value && d.gap.after.value < d.gap.retuned.value);
+    assert!(d.gap.unstructured_ceiling.value <= d.gap.after.value);
+
+    // The same bytes for the same input.
+    let again = diagnosed(&recording, &[]);
+    assert_eq!(serde_json::to_string(&d).unwrap(), serde_json::to_string(&again).unwrap());
+}
+
+#[test]
+fn without_an_effect_nothing_is_named() {
+    let recording = drive(&car(), &[], DURATION_S, 22).unwrap();
+    let d = diagnosed(&recording, &[]);
+    assert!(matches!(d.verdict, Verdict::NoGap | Verdict::TireRetuneOnly), "{}", text(&d));
+    assert_eq!(named(&d), Vec::<&str>::new());
+    // No figure speaks of a candidate, and none is listed that is not there at all.
+    assert_eq!((d.gap.after, d.tires.with_effect), (d.gap.retuned, d.tires.without_effect));
+    assert_eq!(d.gap_closed_fraction.value, 0.0);
+    assert!(d.effects.iter().all(|e| e.parameters.values().all(|p| p.value.is_finite())), "{}", text(&d));
+}
+
+#[test]
+fn an_effect_left_out_is_not_named_and_unknown_names_are_refused() {
+    let recording = drive(&car(), &["v_y_bias=0.15"], DURATION_S, 23).unwrap();
+    let d = diagnosed(&recording, &["v_y_bias".to_owned()]);
+    assert!(d.effects.iter().all(|e| e.name != "v_y_bias"));
+    let vehicle = nominal(&car());
+    let request = Request { without: &["magic".to_owned()], ..Request::new(&recording, &vehicle) };
+    let error = diagnose(&request, &mut |_| {}).unwrap_err();
+    assert!(matches!(error, GapError::Model(ModelError::UnknownEffect { .. })), "{error}");
+}
+
+#[test]
+fn data_that_cannot_tell_get_that_verdict_and_malformed_data_an_error() {
+    let n = 2000;
+    let series = |f: &dyn Fn(usize) -> f32| (0..n).map(f).collect::<Vec<f32>>();
+    let straight = StateSequence {
+        time_s: series(&|k| k as f32 * 0.01),
+        v_x_mps: series(&|k| 10.0 + (k % 7) as f32 * 0.01),
+        v_y_mps: series(&|k| (k % 5) as f32 * 0.001),
+        yaw_rate_radps: series(&|k| (k % 3) as f32 * 0.001),
+        steering_rad: vec![0.0; n],
+        ..StateSequence::default()
+    };
+    let cornering = StateSequence {
+        yaw_rate_radps: series(&|k| (k as f32 * 0.02).sin()),
+        steering_rad: series(&|k| 0.1 * (k as f32 * 0.02).sin()),
+        ..straight.clone()
+    };
+    let cut = |sequence: &StateSequence, len: usize| StateSequence {
+        time_s: sequence.time_s[..len].to_vec(),
+        v_x_mps: sequence.v_x_mps[..len].to_vec(),
+        v_y_mps: sequence.v_y_mps[..len].to_vec(),
+        yaw_rate_radps: sequence.yaw_rate_radps[..len].to_vec(),
+        steering_rad: sequence.steering_rad[..len].to_vec(),
+        ..StateSequence::default()
+    };
+    let vehicle = nominal(&car());
+    let answer = |sequence: &StateSequence| diagnose(&Request::new(sequence, &vehicle), &mut |_| {});
+    for (name, sequence, reason) in [
+        ("straight only", straight.clone(), "cornering says nothing"),
+        ("stopped", StateSequence { v_x_mps: vec![0.0; n], ..cornering.clone() }, "can be used"),
+        ("short", cut(&cornering, 500), "at least 8 s are needed"),
+        ("shorter than a stretch", cut(&cornering, 100), "at least 8 s are needed"),
+        ("10 Hz", StateSequence { time_s: series(&|k| k as f32 * 0.1), ..cornering.clone() }, "too slow"),
+        ("no v_y", StateSequence { v_y_mps: vec![0.0; n], ..cornering.clone() }, "v_y says nothing"),
+        ("constant v_y", StateSequence { v_y_mps: vec![0.3; n], ..cornering.clone() }, "v_y says nothing"),
+        (
+            "frozen v_y",
+            StateSequence {
+                v_y_mps: series(&|k| if k < 300 { k as f32 * 1e-3 } else { 0.3 }),
+                ..cornering.clone()
+            },
+            "stands still",
+        ),
+    ] {
+        let d = answer(&sequence).unwrap();
+        assert_eq!(d.verdict, Verdict::NotIdentifiable, "{name}");
+        assert!(d.reasons[0].contains(reason), "{name}: {}", d.reasons[0]);
+        assert!(text(&d).contains(reason) && !d.drive_next.is_empty(), "{name}");
+        let json: serde_json::Value = serde_json::to_value(&d).unwrap();
+        assert_eq!(json["verdict"], "not_identifiable", "{name}");
+        assert!(json["gap"]["nominal"]["value"].is_null(), "{name}");
+    }
+    let broken = StateSequence { v_y_mps: vec![f32::NAN; n], ..cornering.clone() };
+    assert!(matches!(answer(&broken).unwrap_err(), GapError::Signal(_)));
+    let uneven = StateSequence { steering_rad: vec![0.0; 3], ..cornering };
+    assert!(matches!(answer(&uneven).unwrap_err(), GapError::Signal(_)));
+}
+
+#[test]
+fn one_lap_hides_what_needs_a_second() {
+    let recording = drive(&car(), &[], 12.0, 24).unwrap();
+    let d = diagnosed(&recording, &[]);
+    let patch = d.invisible.iter().find(|i| i.name == "low_grip_patch").unwrap();
+    assert!(patch.reason.contains("lap") || patch.reason.contains("pass"), "{}", patch.reason);
+    assert!(d.effects.iter().all(|e| e.name != "low_grip_patch"));
+}
+
+#[test]
+fn of_two_drives_only_what_has_changed_is_told() {
+    const DELAY: &str = "steering_delay=0.04";
+    let small = CarParameters::by_name("f1tenth").unwrap();
+    let vehicle = nominal(&small);
+    let [late, late_too, prompt] = [(DELAY, 26), (DELAY, 27), ("", 28)].map(|(effect, seed)| {
+        let effects: Vec<&str> = Some(effect).filter(|e| !e.is_empty()).into_iter().collect();
+        drive_at(&small, &effects, 0.8, DURATION_S, seed).unwrap()
+    });
+    let earlier = Earlier::diagnosed(&Request::new(&late, &vehicle), &mut |_| {}).unwrap();
+    assert_eq!(named(&earlier.diagnosis), ["steering_delay"], "{}", text(&earlier.diagnosis));
+    let since = |recording: &StateSequence| {
+        let request = Request { earlier: Some(&earlier), ..Request::new(recording, &vehicle) };
+        diagnose(&request, &mut |_| {}).unwrap()
+    };
+    let same = since(&late_too);
+    assert!(matches!(same.verdict, Verdict::NoGap | Verdict::TireRetuneOnly), "{}", text(&same));
+    let gone = since(&prompt);
+    assert_eq!(named(&gone), ["steering_delay"], "{}", text(&gone));
+    let delay_s = gone.effects[0].parameters["delay_s"].clone();
+    assert!(delay_s.low <= 0.0 && delay_s.high < 0.01 && delay_s.before.unwrap() > 0.035, "{delay_s:?}");
+}

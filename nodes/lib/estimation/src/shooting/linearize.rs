@@ -1,0 +1,230 @@
+//! One look at every window: cost, gradient, and the information matrix with the start states eliminated.
+
+use gripsight_model::{Rollout, Window};
+use gripsight_vehicle::{Dual, Real};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix2xX, Vector2};
+use rayon::prelude::*;
+
+use super::Problem;
+
+/// The problem around a point: J^T J of the free parameters with the start states eliminated, and what goes with it.
+#[derive(Debug, Clone)]
+pub struct Linearization {
+    /// The objective.
+    pub cost: f64,
+    /// Information matrix of the free parameters (P x P).
+    pub information: DMatrix<f64>,
+    /// Half the gradient of the objective by the free parameters (P).
+    pub gradient: DVector<f64>,
+    /// The share of every window in the gradient: what cluster-robust intervals and scores are made of.
+    pub window_gradients: Vec<DVector<f64>>,
+    /// The share of every window in the cost.
+    pub window_costs: Vec<f64>,
+    /// Residuals that count.
+    pub residuals: usize,
+    pub(super) eliminations: Vec<Elimination>,
+}
+
+impl Linearization {
+    /// The objective alone.
+    #[must_use]
+    pub fn evaluation(&self) -> Evaluation {
+        Evaluation { cost: self.cost, window_costs: self.window_costs.clone(), residuals: self.residuals }
+    }
+}
+
+/// How the start of a window follows a step of the parameters: dx = -(offset + slope dtheta).
+#[derive(Debug, Clone)]
+pub(super) struct Elimination {
+    pub(super) offset: Vector2<f64>,
+    pub(super) slope: Matrix2xX<f64>,
+}
+
+struct WindowPart {
+    cost: f64,
+    residuals: usize,
+    information: DMatrix<f64>,
+    gradient: DVector<f64>,
+    elimination: Elimination,
+}
+
+/// Linearizes the problem at given parameters (all of the model's) and start states (one a window). Deterministic: windows are summed in order,
+/// however many threads work on them.
+///
+/// A window whose rollout is not finite gives an infinite cost.
+#[must_use]
+pub fn linearize<M: Rollout>(
+    problem: &Problem<'_, M>,
+    parameters: &[f64],
+    starts: &[[f64; 2]],
+) -> Linearization {
+    let free = problem.free();
+    let parts: Vec<WindowPart> = problem
+        .windows
+        .par_iter()
+        .zip(starts)
+        .map(|(window, start)| {
+            // The number of derivatives is fixed at compile time; take the smallest that holds them all.
+            match free.len() + 2 {
+                0..=4 => part::<M, 4>(problem, &free, parameters, *start, window),
+                5..=8 => part::<M, 8>(problem, &free, parameters, *start, window),
+                9..=12 => part::<M, 12>(problem, &free, parameters, *start, window),
+                13..=16 => part::<M, 16>(problem, &free, parameters, *start, window),
+                17..=20 => part::<M, 20>(problem, &free, parameters, *start, window),
+                21..=24 => part::<M, 24>(problem, &free, parameters, *start, window),
+                25..=32 => part::<M, 32>(problem, &free, parameters, *start, window),
+                33..=48 => part::<M, 48>(problem, &free, parameters, *start, window),
+                _ => part::<M, 80>(problem, &free, parameters, *start, window),
+            }
+        })
+        .collect();
+    let p = free.len();
+    let mut sum = Linearization {
+        cost: 0.0,
+        information: DMatrix::zeros(p, p),
+        gradient: DVector::zeros(p),
+        window_gradients: Vec::with_capacity(parts.len()),
+        window_costs: Vec::with_capacity(parts.len()),
+        residuals: 0,
+        eliminations: Vec::with_capacity(parts.len()),
+    };
+    for part in parts {
+        sum.cost += part.cost;
+        sum.residuals += part.residuals;
+        sum.information += &part.information;
+        sum.gradient += &part.gradient;
+        sum.window_gradients.push(part.gradient);
+        sum.window_costs.push(part.cost);
+        sum.eliminations.push(part.elimination);
+    }
+    for (row, &j) in free.iter().enumerate() {
+        if let Some(prior) = problem.parameters[j].prior {
+            let r = (parameters[j] - prior.mean) / prior.sigma;
+            sum.cost += r * r;
+            sum.information[(row, row)] += prior.sigma.powi(-2);
+            sum.gradient[row] += r / prior.sigma;
+        }
+    }
+    sum
+}
+
+/// The objective at a point, without derivatives.
+#[derive(Debug, Clone, Default)]
+pub struct Evaluation {
+    /// The objective.
+    pub cost: f64,
+    /// The share of every window in it.
+    pub window_costs: Vec<f64>,
+    /// Residuals that count.
+    pub residuals: usize,
+}
+
+/// Evaluates the objective at given parameters (all of the model's) and start states (one a window).
+#[must_use]
+pub fn evaluate<M: Rollout>(problem: &Problem<'_, M>, parameters: &[f64], starts: &[[f64; 2]]) -> Evaluation {
+    let windows: Vec<(f64, usize)> = problem
+        .windows
+        .par_iter()
+        .zip(starts)
+        .map_init(
+            || (Vec::new(), Vec::new()),
+            |(predicted, measured), (window, start)| {
+                problem.model.rollout(parameters, *start, window, predicted);
+                problem.model.measured(window, measured);
+                let scaled = residuals(problem, measured, predicted);
+                let (square, n) = scaled.fold((0.0, 0), |(s, n), (_, r)| (s + r * r, n + 1));
+                (loss(square, n, problem.robust_k).0, n)
+            },
+        )
+        .collect();
+    let priors: f64 = problem
+        .parameters
+        .iter()
+        .zip(parameters)
+        .filter_map(|(p, v)| p.prior.filter(|_| p.free).map(|prior| ((v - prior.mean) / prior.sigma).powi(2)))
+        .sum();
+    let window_costs: Vec<f64> = windows.iter().map(|w| w.0).collect();
+    Evaluation {
+        cost: window_costs.iter().sum::<f64>() + priors,
+        window_costs,
+        residuals: windows.iter().map(|w| w.1).sum(),
+    }
+}
+
+/// The residuals that are measured, with their place.
+fn residuals<'a, M, T: Real>(
+    problem: &'a Problem<'_, M>,
+    measured: &'a [f64],
+    predicted: &'a [T],
+) -> impl Iterator<Item = (usize, f64)> + 'a {
+    let channels = problem.sigma.len();
+    measured
+        .iter()
+        .zip(predicted)
+        .enumerate()
+        .filter(|(_, (m, _))| !m.is_nan())
+        .map(move |(i, (m, y))| (i, (m - y.re()) / problem.sigma[i % channels]))
+}
+
+/// n rho(s/n) of a window's sum of squares s, and the weight that its residuals get: rho'(s/n).
+fn loss(square: f64, n: usize, k: f64) -> (f64, f64) {
+    if !square.is_finite() {
+        return (f64::INFINITY, 0.0);
+    }
+    if k.is_infinite() || n == 0 {
+        return (square, 1.0);
+    }
+    let root = (1.0 + square / n as f64 / (k * k)).sqrt();
+    (n as f64 * 2.0 * k * k * (root - 1.0), 1.0 / root)
+}
+
+fn part<M: Rollout, const N: usize>(
+    problem: &Problem<'_, M>,
+    free: &[usize],
+    parameters: &[f64],
+    start: [f64; 2],
+    window: &Window,
+) -> WindowPart {
+    let p = free.len();
+    let mut theta: Vec<Dual<N>> = parameters.iter().map(|&v| Dual::from(v)).collect();
+    for (lane, &j) in free.iter().enumerate() {
+        theta[j] = Dual::variable(parameters[j], lane);
+    }
+    let start = [Dual::variable(start[0], p), Dual::variable(start[1], p + 1)];
+    let (mut predicted, mut measured) = (Vec::new(), Vec::new());
+    problem.model.rollout(&theta, start, window, &mut predicted);
+    problem.model.measured(window, &mut measured);
+
+    let mut square = 0.0;
+    let mut n = 0;
+    // J^T J and J^T r over all lanes, the two start states last; J = d(residual) = -d(predicted)/sigma.
+    let mut lower = [[0.0; N]; N];
+    let mut product = [0.0; N];
+    let channels = problem.sigma.len();
+    for (i, r) in residuals(problem, &measured, &predicted) {
+        square += r * r;
+        n += 1;
+        let scale = -1.0 / problem.sigma[i % channels];
+        let jacobian = predicted[i].derivatives().map(|d| d * scale);
+        for (a, &ja) in jacobian.iter().enumerate().take(p + 2).filter(|(_, ja)| **ja != 0.0) {
+            product[a] += ja * r;
+            for (sum, jb) in lower[a].iter_mut().zip(&jacobian[..=a]) {
+                *sum += ja * jb;
+            }
+        }
+    }
+    let (cost, weight) = loss(square, n, problem.robust_k);
+    let jtj = DMatrix::from_fn(p + 2, p + 2, |a, b| weight * lower[a.max(b)][a.min(b)]);
+    let jtr = DVector::from_fn(p + 2, |a, _| weight * product[a]);
+
+    let start_block = Matrix2::new(jtj[(p, p)], jtj[(p, p + 1)], jtj[(p + 1, p)], jtj[(p + 1, p + 1)]);
+    // A start that the outputs do not show stays where it is.
+    let inverse = (start_block + Matrix2::identity() * 1e-12).try_inverse().unwrap_or_else(Matrix2::zeros);
+    let cross = jtj.view((p, 0), (2, p)).into_owned();
+    let offset = inverse * Vector2::new(jtr[p], jtr[p + 1]);
+    let slope =
+        Matrix2xX::from_fn(p, |r, c| inverse[(r, 0)] * cross[(0, c)] + inverse[(r, 1)] * cross[(1, c)]);
+    let information = jtj.view((0, 0), (p, p)) - cross.transpose() * &slope;
+    let gradient = jtr.rows(0, p) - cross.transpose() * offset;
+    WindowPart { cost, residuals: n, information, gradient, elimination: Elimination { offset, slope } }
+}

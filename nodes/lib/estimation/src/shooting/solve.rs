@@ -1,0 +1,244 @@
+//! Levenberg-Marquardt within bounds.
+
+use gripsight_model::Rollout;
+use nalgebra::{DMatrix, DVector};
+
+use super::{Evaluation, Linearization, Problem, evaluate, linearize};
+
+/// Why a fit ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StopReason {
+    /// The last step changed the cost by less than the tolerance.
+    Converged,
+    /// No step lowers the cost any more.
+    NoDescent,
+    /// The iterations were used up.
+    MaxIterations,
+    /// The start itself gives no finite cost.
+    NotFinite,
+}
+
+/// Result of a fit.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// All parameters of the model.
+    pub parameters: Vec<f64>,
+    /// Start state of every window.
+    pub starts: Vec<[f64; 2]>,
+    /// The problem around the solution.
+    pub linearization: Linearization,
+    /// Free parameters that ended on a bound.
+    pub on_bound: Vec<usize>,
+    /// Why it ended.
+    pub stop: StopReason,
+    /// Steps taken.
+    pub iterations: usize,
+    free: Vec<usize>,
+}
+
+impl Fit {
+    /// Covariance of the free parameters, in their order, robust to errors that are correlated within a window and, in long drives,
+    /// over neighbouring windows, as banking and a drifting v_y make them: a sandwich H^-1 (sum_c g_c g_c^T) H^-1 with at most 40 clusters. Parameters on a bound count as known. `None` where the information is singular.
+    #[must_use]
+    pub fn covariance(&self) -> Option<DMatrix<f64>> {
+        let p = self.free.len();
+        let pinned: Vec<bool> = self.free.iter().map(|j| self.on_bound.contains(j)).collect();
+        let mut information = self.linearization.information.clone();
+        pin(&mut information, None, &pinned);
+        let inverse = information.cholesky()?.inverse();
+        let mut meat = DMatrix::zeros(p, p);
+        let gradients = &self.linearization.window_gradients;
+        let clusters = gradients.chunks(gradients.len().div_ceil(CLUSTERS).max(1));
+        let count = clusters.len() as f64;
+        for cluster in clusters {
+            let mut g = cluster.iter().fold(DVector::zeros(p), |sum, g| sum + g);
+            (0..p).filter(|&a| pinned[a]).for_each(|a| g[a] = 0.0);
+            meat += &g * g.transpose();
+        }
+        let small_sample = count / (count - p as f64).max(1.0);
+        Some(&inverse * meat * inverse * small_sample)
+    }
+
+    /// Covariance of some parameters of the model; those that were not free count as known. `None` where the information is singular.
+    #[must_use]
+    pub fn covariance_of(&self, parameters: &[usize]) -> Option<DMatrix<f64>> {
+        let all = self.covariance()?;
+        let place = |j: usize| self.free.iter().position(|&f| f == j);
+        Some(DMatrix::from_fn(parameters.len(), parameters.len(), |a, b| {
+            match (place(parameters[a]), place(parameters[b])) {
+                (Some(a), Some(b)) => all[(a, b)],
+                _ => 0.0,
+            }
+        }))
+    }
+
+    /// Covariance of some parameters of the model where noise, errors of the model and priors are as large as the problem says: the inverse of
+    /// the information. Parameters that were not free, or ended on a bound, count as known. `None` where the information is singular.
+    #[must_use]
+    pub fn posterior_of(&self, parameters: &[usize]) -> Option<DMatrix<f64>> {
+        let mut information = self.linearization.information.clone();
+        let pinned: Vec<bool> = self.free.iter().map(|j| self.on_bound.contains(j)).collect();
+        pin(&mut information, None, &pinned);
+        let inverse = information.cholesky()?.inverse();
+        let place = |j: usize| self.free.iter().position(|&f| f == j).filter(|&p| !pinned[p]);
+        Some(DMatrix::from_fn(parameters.len(), parameters.len(), |a, b| {
+            match (place(parameters[a]), place(parameters[b])) {
+                (Some(a), Some(b)) => inverse[(a, b)],
+                _ => 0.0,
+            }
+        }))
+    }
+
+    /// Standard error of parameter `j` of the model; `None` if it was not free or nothing is known of it.
+    #[must_use]
+    pub fn standard_error(&self, j: usize) -> Option<f64> {
+        let place = self.free.iter().position(|&f| f == j)?;
+        self.covariance().map(|c| c[(place, place)].max(0.0).sqrt())
+    }
+}
+
+/// Most clusters of the covariance: enough for its rank, few enough that a long drive's clusters outlast a corner.
+const CLUSTERS: usize = 40;
+
+/// Where a descent has come to.
+#[derive(Debug, Clone)]
+pub struct Descent {
+    /// All parameters of the model.
+    pub parameters: Vec<f64>,
+    /// Start state of every window.
+    pub starts: Vec<[f64; 2]>,
+    /// The objective there.
+    pub at: Evaluation,
+    /// Why it ended.
+    pub stop: StopReason,
+    /// Steps taken.
+    pub iterations: usize,
+}
+
+/// Fits the free parameters of a problem, from its start values and the given start states (else the model's guesses).
+#[must_use]
+pub fn fit<M: Rollout>(problem: &Problem<'_, M>, starts: Option<Vec<[f64; 2]>>) -> Fit {
+    let free = problem.free();
+    let (end, around) = run(problem, &free, starts);
+    let Descent { parameters, starts, stop, iterations, .. } = end;
+    let linearization = around.unwrap_or_else(|| linearize(problem, &parameters, &starts));
+    let on_bound = free
+        .iter()
+        .copied()
+        .filter(|&j| {
+            let p = &problem.parameters[j];
+            let margin = 1e-6 * (p.high - p.low);
+            parameters[j] <= p.low + margin || parameters[j] >= p.high - margin
+        })
+        .collect();
+    Fit { parameters, starts, linearization, on_bound, stop, iterations, free }
+}
+
+/// [`fit`] without the derivatives at its end, where only the values are wanted.
+#[must_use]
+pub fn descend<M: Rollout>(problem: &Problem<'_, M>, starts: Option<Vec<[f64; 2]>>) -> Descent {
+    run(problem, &problem.free(), starts).0
+}
+
+/// Descends; with the problem around the end where it is known.
+fn run<M: Rollout>(
+    problem: &Problem<'_, M>,
+    free: &[usize],
+    starts: Option<Vec<[f64; 2]>>,
+) -> (Descent, Option<Linearization>) {
+    let mut parameters: Vec<f64> = problem.parameters.iter().map(|p| p.start.clamp(p.low, p.high)).collect();
+    let mut starts =
+        starts.unwrap_or_else(|| problem.windows.iter().map(|w| problem.model.start_guess(w)).collect());
+    let mut here = linearize(problem, &parameters, &starts);
+    let mut damping = 1e-3;
+    let mut iterations = 0;
+    let ended = |here: Linearization, parameters, starts, stop, iterations| {
+        let at = here.evaluation();
+        (Descent { parameters, starts, at, stop, iterations }, Some(here))
+    };
+    if !here.cost.is_finite() {
+        return ended(here, parameters, starts, StopReason::NotFinite, iterations);
+    }
+    while iterations < problem.max_iterations {
+        iterations += 1;
+        let Some((trial, trial_starts, at)) = step(problem, free, &parameters, &starts, &here, &mut damping)
+        else {
+            return ended(here, parameters, starts, StopReason::NoDescent, iterations);
+        };
+        let change = (here.cost - at.cost) / here.cost.max(f64::MIN_POSITIVE);
+        (parameters, starts) = (trial, trial_starts);
+        let converged = change < problem.tolerance;
+        if converged || iterations == problem.max_iterations {
+            let stop = if converged { StopReason::Converged } else { StopReason::MaxIterations };
+            return (Descent { parameters, starts, at, stop, iterations }, None);
+        }
+        here = linearize(problem, &parameters, &starts);
+    }
+    ended(here, parameters, starts, StopReason::MaxIterations, iterations)
+}
+
+/// Finds a step that lowers the cost, raising the damping until one does.
+fn step<M: Rollout>(
+    problem: &Problem<'_, M>,
+    free: &[usize],
+    parameters: &[f64],
+    starts: &[[f64; 2]],
+    here: &Linearization,
+    damping: &mut f64,
+) -> Option<(Vec<f64>, Vec<[f64; 2]>, Evaluation)> {
+    // A parameter on its bound that would go further out does not take part.
+    let pinned: Vec<bool> = free
+        .iter()
+        .enumerate()
+        .map(|(row, &j)| {
+            let (p, v, g) = (&problem.parameters[j], parameters[j], here.gradient[row]);
+            (v <= p.low && g > 0.0) || (v >= p.high && g < 0.0)
+        })
+        .collect();
+    for _ in 0..12 {
+        let mut information = here.information.clone();
+        let mut gradient = here.gradient.clone();
+        for a in 0..free.len() {
+            information[(a, a)] += *damping * information[(a, a)].max(1e-12);
+        }
+        pin(&mut information, Some(&mut gradient), &pinned);
+        if let Some(cholesky) = information.cholesky() {
+            let step = -cholesky.solve(&gradient);
+            let mut trial = parameters.to_vec();
+            for (row, &j) in free.iter().enumerate() {
+                let p = &problem.parameters[j];
+                trial[j] = (trial[j] + step[row]).clamp(p.low, p.high);
+            }
+            let taken = DVector::from_iterator(free.len(), free.iter().map(|&j| trial[j] - parameters[j]));
+            let trial_starts: Vec<[f64; 2]> = starts
+                .iter()
+                .zip(&here.eliminations)
+                .map(|(x, e)| {
+                    let dx = e.offset + &e.slope * &taken;
+                    [x[0] - dx[0], x[1] - dx[1]]
+                })
+                .collect();
+            let at = evaluate(problem, &trial, &trial_starts);
+            if at.cost < here.cost {
+                *damping = (*damping * 0.2).max(1e-9);
+                return Some((trial, trial_starts, at));
+            }
+        }
+        *damping = (*damping * 5.0).max(1e-6);
+    }
+    None
+}
+
+/// Takes rows and columns out of a system without changing its size.
+fn pin(information: &mut DMatrix<f64>, gradient: Option<&mut DVector<f64>>, pinned: &[bool]) {
+    for a in (0..pinned.len()).filter(|&a| pinned[a]) {
+        information.row_mut(a).fill(0.0);
+        information.column_mut(a).fill(0.0);
+        information[(a, a)] = 1.0;
+    }
+    if let Some(gradient) = gradient {
+        for a in (0..pinned.len()).filter(|&a| pinned[a]) {
+            gradient[a] = 0.0;
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! A linear second-order plant with known parameters.
+
+use super::*;
+use gripsight_model::{Rollout, Window, tile};
+use gripsight_vehicle::Real;
+use rand::{RngExt, SeedableRng};
+
+/// x1' = x2, x2' = -a x1 - b x2; x1 is measured, 0.02 s apart.
+struct Oscillator {
+    measured: Vec<f64>,
+}
+
+const DT_S: f64 = 0.02;
+
+impl Rollout for Oscillator {
+    fn channels(&self) -> usize {
+        1
+    }
+
+    fn rollout<T: Real>(&self, parameters: &[T], start: [T; 2], window: &Window, out: &mut Vec<T>) {
+        out.clear();
+        let [mut x, mut v] = start;
+        for _ in 0..window.len {
+            out.push(x);
+            for _ in 0..10 {
+                v += (-(parameters[0] * x) - parameters[1] * v) * (DT_S / 10.0);
+                x += v * (DT_S / 10.0);
+            }
+        }
+    }
+
+    fn measured(&self, window: &Window, out: &mut Vec<f64>) {
+        out.clear();
+        out.extend_from_slice(&self.measured[window.from..window.from + window.len]);
+    }
+
+    fn start_guess(&self, window: &Window) -> [f64; 2] {
+        [self.measured[window.from], 0.0]
+    }
+}
+
+fn plant(noise: f64, seed: u64) -> Oscillator {
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let clean = Oscillator { measured: vec![] };
+    let mut out = Vec::new();
+    clean.rollout(&[40.0, 0.3], [1.0, 0.0], &Window { segment: 0, from: 0, len: 1000 }, &mut out);
+    let measured = out.iter().map(|x| x + noise * (random.random::<f64>() - 0.5) * 12_f64.sqrt()).collect();
+    Oscillator { measured }
+}
+
+fn parameters() -> Vec<Parameter> {
+    [20.0, 1.0].map(|start| Parameter { start, low: 0.0, high: 100.0, free: true, prior: None }).to_vec()
+}
+
+fn solve(plant: &Oscillator, parameters: &[Parameter], robust_k: f64) -> Fit {
+    let windows = tile(&[1000], 50);
+    fit(
+        &Problem {
+            model: plant,
+            windows: &windows,
+            sigma: &[0.01],
+            parameters,
+            robust_k,
+            tolerance: TOLERANCE,
+            max_iterations: 50,
+        },
+        None,
+    )
+}
+
+#[test]
+fn finds_the_parameters_and_its_intervals_cover() {
+    let mut covered = 0;
+    for seed in 0..60 {
+        let found = solve(&plant(0.01, seed), &parameters(), f64::INFINITY);
+        assert_eq!(found.stop, StopReason::Converged);
+        approx::assert_relative_eq!(found.parameters[0], 40.0, max_relative = 0.05);
+        let error = found.standard_error(0).unwrap();
+        covered += usize::from((found.parameters[0] - 40.0).abs() < 1.645 * error);
+    }
+    // Binomial(60, 0.9): 46 or fewer happens once in 900.
+    assert!(covered > 46, "90 % intervals covered {covered} of 60");
+}
+
+#[test]
+fn outlying_windows_hardly_move_the_robust_fit() {
+    let mut bad = plant(0.01, 1);
+    for k in 300..340 {
+        bad.measured[k] += 1.0;
+    }
+    let plain = (solve(&bad, &parameters(), f64::INFINITY).parameters[1] - 0.3).abs();
+    let robust = (solve(&bad, &parameters(), 2.0).parameters[1] - 0.3).abs();
+    assert!(robust < 0.3 * plain, "robust {robust}, plain {plain}");
+}
+
+#[test]
+fn bounds_priors_and_fixed_parameters_hold() {
+    let mut bounded = parameters();
+    bounded[0].high = 30.0;
+    let found = solve(&plant(0.01, 2), &bounded, f64::INFINITY);
+    assert_eq!((found.parameters[0], found.on_bound.as_slice()), (30.0, [0].as_slice()));
+
+    let mut fixed = parameters();
+    fixed[1].free = false;
+    assert_eq!(solve(&plant(0.01, 2), &fixed, f64::INFINITY).parameters[1], 1.0);
+
+    let mut tight = parameters();
+    tight[0].prior = Some(Prior { mean: 45.0, sigma: 1e-4 });
+    approx::assert_abs_diff_eq!(
+        solve(&plant(0.01, 2), &tight, f64::INFINITY).parameters[0],
+        45.0,
+        epsilon = 1e-2
+    );
+}
+
+#[test]
+fn the_gradient_is_the_derivative_of_the_cost() {
+    let plant = plant(0.01, 3);
+    let windows = tile(&[1000], 50);
+    let parameters = parameters();
+    let problem = Problem {
+        model: &plant,
+        windows: &windows,
+        sigma: &[0.01],
+        parameters: &parameters,
+        robust_k: 2.0,
+        tolerance: TOLERANCE,
+        max_iterations: 0,
+    };
+    // With the starts at their best, the gradient with the starts eliminated is the plain one.
+    let found = fit(
+        &Problem {
+            max_iterations: 30,
+            parameters: &parameters.iter().map(|p| Parameter { free: false, ..*p }).collect::<Vec<_>>(),
+            ..problem
+        },
+        None,
+    );
+    let at = |a: f64| evaluate(&problem, &[a, 1.0], &found.starts).cost;
+    let here = linearize(&problem, &[20.0, 1.0], &found.starts);
+    let numeric = (at(20.001) - at(19.999)) / 0.002;
+    approx::assert_relative_eq!(2.0 * here.gradient[0], numeric, max_relative = 1e-4);
+}

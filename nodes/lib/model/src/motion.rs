@@ -1,0 +1,346 @@
+//! The equations of motion with the effects in their places, integrated over a window.
+//!
+//! Explicit midpoint rule, like the nominal model; lags inside the loop (relaxation, roll) are solved exactly for an input that is linear
+//! over the step, so that a lag of zero is no lag at all and its derivative there is right.
+
+use crate::rollout::Window;
+use gripsight_vehicle::{PacejkaParameters, Real};
+
+use crate::effects::EffectId;
+use crate::flexible::Push;
+use crate::model::ExtendedModel;
+use crate::terms::{Axle, Axles, Car, Lag, Moment, Motion, Outputs};
+
+/// Below this forward speed slip angles mean nothing; the model is evaluated as if at this speed.
+const MIN_SPEED_MPS: f64 = 0.2;
+/// Time in which the body follows the lateral acceleration in roll.
+const ROLL_TIME_S: f64 = 0.08;
+/// What the inertia of the turning wheels adds to the mass along the road, as a share of it. A command speaks of the car's own acceleration:
+/// the wheels' is on top of it, and everything else that pushes has to turn them, too. Wong, Theory of Ground Vehicles, section 3.1: 1.04 and more.
+const TURNING_SHARE: f64 = 0.06;
+
+/// Runs the car over one window.
+pub(crate) struct Mover<'m, 'a, T> {
+    model: &'m ExtendedModel<'a>,
+    p: &'m [T],
+    car: &'m Car<T>,
+    axles_at_rest: Axles<T>,
+    tires: PacejkaParameters<T>,
+    /// Road-wheel angles before the window, up to its start.
+    before: &'m [T],
+    /// Road-wheel angles in the window.
+    steering: &'m [T],
+    window: &'m Window,
+    relaxes: bool,
+    rolls: bool,
+}
+
+/// What is added to the accelerations throughout a sample.
+struct Extra<T> {
+    /// To those of v_y and yaw rate.
+    push: [T; 2],
+    flexible: Option<Push<T>>,
+}
+
+/// The inputs of an instant.
+struct Instant<'e, T> {
+    v_x_mps: T,
+    steering_rad: T,
+    a_x_mps2: f64,
+    force_x_mps2: f64,
+    minutes: f64,
+    lap_share: f64,
+    place_rad: f64,
+    extra: &'e Extra<T>,
+}
+
+/// What an instant leaves behind for the next.
+#[derive(Clone, Copy)]
+struct Memory<T> {
+    a_y_mps2: T,
+    rolled_a_y_mps2: T,
+    front_use: T,
+    /// Slip angles behind the relaxation, and those they follow.
+    slip_rad: [T; 2],
+    steady_rad: [T; 2],
+}
+
+/// Accelerations of an instant.
+struct Rates<T> {
+    v_y_mps2: T,
+    yaw_radps2: T,
+    v_x_mps2: T,
+    a_y_mps2: T,
+    a_x_mps2: T,
+    memory: Memory<T>,
+}
+
+impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
+    /// `steering` begins `run_in` samples before the window.
+    pub(crate) fn new(
+        model: &'m ExtendedModel<'a>,
+        p: &'m [T],
+        car: &'m Car<T>,
+        tires: PacejkaParameters<T>,
+        steering: &'m [T],
+        run_in: usize,
+        window: &'m Window,
+    ) -> Self {
+        let (before, steering) = steering.split_at(run_in);
+        let has = |effect| model.effects.contains(&effect);
+        Self {
+            model,
+            p,
+            car,
+            axles_at_rest: car.axles_at_rest(),
+            tires,
+            before,
+            steering,
+            window,
+            relaxes: has(EffectId::TireRelaxation) && car.relaxation_m.re() >= 0.0,
+            rolls: has(EffectId::RollSteer),
+        }
+    }
+
+    /// The motion from a start, with accelerations of v_y and yaw rate added throughout.
+    pub(crate) fn run(&self, start: [T; 2], push: [T; 2]) -> Outputs<T> {
+        let run = &self.model.recording.runs[self.window.segment];
+        let n = self.window.len;
+        let dt_s = run.dt_s;
+        let substeps = (dt_s / self.model.substep_s - 1e-9).ceil().max(1.0);
+        let h_s = dt_s / substeps;
+        let zero = T::from(0.0);
+        let mut out = Outputs {
+            dt_s,
+            v_y_mps: Vec::with_capacity(n),
+            yaw_rate_radps: Vec::with_capacity(n),
+            yaw_acceleration_radps2: Vec::with_capacity(n),
+            a_y_mps2: Vec::with_capacity(n),
+            a_x_mps2: Vec::with_capacity(n),
+            v_x_mps: Vec::with_capacity(n),
+            heading_rad: Vec::with_capacity(n),
+        };
+        let mut x = start;
+        let (mut speed, mut heading) = (zero, zero);
+        let mut residual = self.model.residual.map(|r| r.stream(run, self.window));
+        let mut extra = self.extra(0, push);
+        let mut rates = self.settled(x, h_s, &extra);
+        for k in 0..n {
+            let push = match &mut residual {
+                Some(stream) => stream.next(k, [x[0].re(), x[1].re()]).map(T::from),
+                None => push,
+            };
+            extra = self.extra(k, push);
+            out.v_y_mps.push(x[0]);
+            out.yaw_rate_radps.push(x[1]);
+            out.yaw_acceleration_radps2.push(rates.yaw_radps2);
+            out.a_y_mps2.push(rates.a_y_mps2);
+            out.a_x_mps2.push(rates.a_x_mps2);
+            out.v_x_mps.push(speed);
+            out.heading_rad.push(heading);
+            if k + 1 == n {
+                break;
+            }
+            for i in 0..substeps as usize {
+                let middle = self.instant(k, (i as f64 + 0.5) / substeps, &extra);
+                let half = [x[0] + rates.v_y_mps2 * (h_s / 2.0), x[1] + rates.yaw_radps2 * (h_s / 2.0)];
+                let there = self.rates(half, &middle, &rates.memory, h_s / 2.0, self.relaxes);
+                x = [x[0] + there.v_y_mps2 * h_s, x[1] + there.yaw_radps2 * h_s];
+                speed += there.v_x_mps2 * h_s;
+                heading += half[1] * h_s;
+                let end = self.instant(k, (i as f64 + 1.0) / substeps, &extra);
+                rates = self.rates(x, &end, &rates.memory, h_s, self.relaxes);
+            }
+        }
+        out
+    }
+
+    /// Rates at the start, as if the motion had gone on as it does there.
+    fn settled(&self, x: [T; 2], h_s: f64, extra: &Extra<T>) -> Rates<T> {
+        let now = self.instant(0, 0.0, extra);
+        let zero = T::from(0.0);
+        let a_y_mps2 = now.v_x_mps * x[1];
+        let mut memory = Memory {
+            a_y_mps2,
+            rolled_a_y_mps2: a_y_mps2,
+            front_use: zero,
+            slip_rad: [zero; 2],
+            steady_rad: [zero; 2],
+        };
+        // The front use settles in three turns.
+        let mut rates = self.rates(x, &now, &memory, h_s, false);
+        for _ in 0..2 {
+            memory.front_use = rates.memory.front_use;
+            rates = self.rates(x, &now, &memory, h_s, false);
+        }
+        if !self.relaxes {
+            return rates;
+        }
+        memory = rates.memory;
+        let behind = self.slip_behind();
+        memory.slip_rad = [memory.steady_rad[0] + behind[0], memory.steady_rad[1] + behind[1]];
+        self.rates(x, &now, &memory, 0.0, true)
+    }
+
+    /// How far the relaxed slip angles lie from the steady ones when the window starts: the filter run over the measured motion before it.
+    /// Offsets of the measurement cancel.
+    fn slip_behind(&self) -> [T; 2] {
+        let run = &self.model.recording.runs[self.window.segment];
+        let start = self.window.from;
+        let zero = T::from(0.0);
+        let mut steady = [zero; 2];
+        let mut slip = [zero; 2];
+        let count = self.before.len();
+        for (i, &steering_rad) in self.before.iter().chain(self.steering.first()).enumerate() {
+            let k = start + i - count;
+            let v_x = self.car.speed_factor * run.v_x_mps[k].max(MIN_SPEED_MPS);
+            let (v_y, r) = (run.smooth[0][k], run.smooth[1][k]);
+            let now = [
+                steering_rad - ((self.car.l_f_m * r + v_y) / v_x).atan(),
+                -((-(self.car.l_r_m * r) + v_y) / v_x).atan(),
+            ];
+            let lag = Lag::new(run.dt_s, self.car.relaxation_m / v_x);
+            for axle in 0..2 {
+                slip[axle] = if i == 0 { now[axle] } else { lag.step(slip[axle], steady[axle], now[axle]) };
+            }
+            steady = now;
+        }
+        [slip[0] - steady[0], slip[1] - steady[1]]
+    }
+
+    fn extra(&self, k: usize, push: [T; 2]) -> Extra<T> {
+        let run = &self.model.recording.runs[self.window.segment];
+        let flexible = self.model.flexible.as_ref();
+        let own = || self.model.flexible_parameters(self.p);
+        Extra { push, flexible: flexible.map(|f| f.push(own(), run, self.window.from + k)) }
+    }
+
+    fn instant<'e>(&self, k: usize, share: f64, extra: &'e Extra<T>) -> Instant<'e, T> {
+        let run = &self.model.recording.runs[self.window.segment];
+        let (a, b) = (self.window.from + k, (self.window.from + k + 1).min(run.len() - 1));
+        let next = (k + 1).min(self.steering.len() - 1);
+        let mix = |s: &[f64]| s[a] + (s[b] - s[a]) * share;
+        // The lap's end is not a place to interpolate across.
+        let lap = &run.lap_share;
+        let turn = lap[b] - lap[a];
+        Instant {
+            v_x_mps: self.car.speed_factor * mix(&run.v_x_mps),
+            steering_rad: self.steering[k] + (self.steering[next] - self.steering[k]) * share,
+            a_x_mps2: mix(&run.a_x_mps2),
+            force_x_mps2: run.force_x_mps2[a],
+            minutes: (run.time_s(a) + share * run.dt_s) / 60.0,
+            lap_share: lap[a] + (turn - turn.round()) * share,
+            place_rad: run.place_rad[a],
+            extra,
+        }
+    }
+
+    /// Accelerations `h_s` after an instant that left `memory`; where nothing `relaxes`, the slip is the steady one whatever the memory holds.
+    fn rates(
+        &self,
+        x: [T; 2],
+        now: &Instant<'_, T>,
+        memory: &Memory<T>,
+        h_s: f64,
+        relaxes: bool,
+    ) -> Rates<T> {
+        let (model, car) = (self.model, self.car);
+        let [v_y, r] = x;
+        let v_x = if now.v_x_mps.re() < MIN_SPEED_MPS { T::from(MIN_SPEED_MPS) } else { now.v_x_mps };
+        let at = Moment {
+            v_x_mps: v_x,
+            yaw_rate_radps: r,
+            a_y_mps2: memory.a_y_mps2,
+            rolled_a_y_mps2: memory.rolled_a_y_mps2,
+            front_use: memory.front_use,
+            a_x_mps2: now.a_x_mps2,
+            force_x_mps2: now.force_x_mps2,
+            minutes: now.minutes,
+            lap_share: now.lap_share,
+            lap_m: model.recording.laps.lap_m,
+            place_rad: now.place_rad,
+        };
+        let mut axles = self.axles_at_rest;
+        for (effect, values) in model.with_parameters(self.p) {
+            effect.loads(values, car, &at, &mut axles);
+        }
+        for (effect, values) in model.with_parameters(self.p) {
+            effect.grip(values, car, &at, &mut axles);
+        }
+        let front_rad = now.steering_rad + axles.front.steer_rad;
+        let steady_rad = [
+            front_rad - ((v_y + r * car.l_f_m) / v_x).atan(),
+            axles.rear.steer_rad - ((v_y - r * car.l_r_m) / v_x).atan(),
+        ];
+        let mut slip_rad = steady_rad;
+        if relaxes && h_s > 0.0 {
+            let lag = Lag::new(h_s, car.relaxation_m / v_x);
+            for (i, slip) in slip_rad.iter_mut().enumerate() {
+                *slip = lag.step(memory.slip_rad[i], memory.steady_rad[i], steady_rad[i]);
+            }
+        } else if relaxes {
+            slip_rad = memory.slip_rad;
+        }
+        let force = |axle: &Axle<T>, tire: &gripsight_vehicle::MagicFormula<T>, slip: T| {
+            tire.normalized_force(slip / axle.grip) * axle.grip * axle.usable
+        };
+        let front_use = force(&axles.front, &self.tires.front, slip_rad[0]);
+        let rear_use = force(&axles.rear, &self.tires.rear, slip_rad[1]);
+        let (sin, cos) = now.steering_rad.sin_cos();
+        let front_n = front_use * axles.front.carried_n(self.axles_at_rest.front.load_n);
+        let rear_n = rear_use * axles.rear.carried_n(self.axles_at_rest.rear.load_n);
+        let mut motion = Motion::none();
+        for (effect, values) in model.with_parameters(self.p) {
+            effect.motion(values, car, &at, &mut motion);
+        }
+        let commanded = model.recording.has_command;
+        // Force along the front wheels turns with them; it is known only where it is commanded.
+        let front_x_n = if commanded {
+            car.front_share(now.force_x_mps2 > 0.0) * now.force_x_mps2 * car.nominal_mass_kg
+        } else {
+            0.0
+        };
+        let front_y_n = if commanded { front_n * cos + sin * front_x_n } else { front_n * cos };
+        let mut a_y = (rear_n + front_y_n) / car.mass_kg + motion.force_y_mps2 + now.extra.push[0];
+        let mut yaw_radps2 = (front_y_n * car.l_f_m - rear_n * car.l_r_m) / car.yaw_inertia_kgm2
+            + motion.yaw_radps2
+            + now.extra.push[1];
+        if let Some(flexible) = &model.flexible {
+            let own = model.flexible_parameters(self.p);
+            let rate = |i: usize| {
+                if h_s > 0.0 { (steady_rad[i] - memory.steady_rad[i]) / h_s } else { T::from(0.0) }
+            };
+            let [more_y, more_yaw] = flexible.forces(own, &at, steady_rad, [rate(0), rate(1)]);
+            a_y += more_y;
+            yaw_radps2 += more_yaw;
+        }
+        if let Some(push) = &now.extra.flexible {
+            a_y += push.force_y_mps2;
+            yaw_radps2 += push.yaw_radps2;
+            motion.force_x_mps2 += push.force_x_mps2;
+            motion.gravity_x_mps2 += push.gravity_x_mps2;
+            motion.gravity_y_mps2 += push.gravity_y_mps2;
+        }
+        let along_mps2 = if commanded {
+            let turning_kg = TURNING_SHARE * car.nominal_mass_kg;
+            let commanded_n = now.force_x_mps2 * (car.nominal_mass_kg + turning_kg);
+            let pushed_mps2 = motion.force_x_mps2 + motion.gravity_x_mps2;
+            (-(front_n * sin) + pushed_mps2 * car.mass_kg + commanded_n) / (car.mass_kg + turning_kg)
+        } else {
+            motion.gravity_x_mps2 + now.a_x_mps2
+        };
+        let rolled = if self.rolls && h_s > 0.0 {
+            Lag::new(h_s, T::from(ROLL_TIME_S)).step(memory.rolled_a_y_mps2, memory.a_y_mps2, a_y)
+        } else {
+            memory.rolled_a_y_mps2
+        };
+        Rates {
+            v_y_mps2: a_y - now.v_x_mps * r + motion.gravity_y_mps2,
+            yaw_radps2,
+            v_x_mps2: along_mps2 + v_y * r,
+            a_y_mps2: a_y,
+            a_x_mps2: along_mps2 - motion.gravity_x_mps2,
+            memory: Memory { a_y_mps2: a_y, rolled_a_y_mps2: rolled, front_use, slip_rad, steady_rad },
+        }
+    }
+}

@@ -1,0 +1,336 @@
+//! The telemetry as the diagnosis uses it: even stretches, the channels to be explained, and what goes into the model.
+
+use gripsight_signals::{Segment, StateSequence, segments};
+
+use crate::ModelError;
+use crate::smooth::{local_quadratic, median, quantile};
+use crate::station::{Laps, stations};
+
+/// A signal that the model predicts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Channel {
+    /// Lateral velocity of the odometry.
+    LateralVelocity,
+    /// Yaw rate of the odometry.
+    YawRate,
+    /// Specific force to the left of the inertial unit.
+    LateralAcceleration,
+    /// Yaw rate of the gyroscope, where it is not the odometry's.
+    Gyro,
+    /// Heading, less its mean over a window, where the yaw rate was not derived from it.
+    Heading,
+    /// Specific force forward, with a longitudinal command.
+    LongitudinalAcceleration,
+    /// Forward speed, less its mean over a window, with a longitudinal command.
+    Speed,
+    /// v_y less the integral of a_y - v_x r, less its mean: zero for any tire where the sensors and the road are as assumed. Fitted, not
+    /// scored: it repeats what other channels hold, without the tires' errors.
+    LateralKinematics,
+}
+
+impl Channel {
+    /// Every channel.
+    pub const ALL: [Self; 8] = [
+        Self::LateralVelocity,
+        Self::YawRate,
+        Self::LateralAcceleration,
+        Self::Gyro,
+        Self::Heading,
+        Self::LongitudinalAcceleration,
+        Self::Speed,
+        Self::LateralKinematics,
+    ];
+
+    /// Name with unit.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::LateralVelocity => "v_y_mps",
+            Self::YawRate => "yaw_rate_radps",
+            Self::LateralAcceleration => "a_y_mps2",
+            Self::Gyro => "gyro_yaw_rate_radps",
+            Self::Heading => "heading_rad",
+            Self::LongitudinalAcceleration => "a_x_mps2",
+            Self::Speed => "v_x_mps",
+            Self::LateralKinematics => "v_y_kinematic_mps",
+        }
+    }
+
+    /// Whether only its course over a window counts, not its level.
+    pub fn without_mean(self) -> bool {
+        matches!(self, Self::Heading | Self::Speed | Self::LateralKinematics)
+    }
+
+    /// Whether errors in it count where models are scored.
+    pub fn scored(self) -> bool {
+        self != Self::LateralKinematics
+    }
+}
+
+/// An even stretch of the recording.
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// Time of its first sample since the recording's first.
+    pub start_time_s: f64,
+    /// Step between samples.
+    pub dt_s: f64,
+    /// Forward speed, smoothed.
+    pub v_x_mps: Vec<f64>,
+    /// Recorded steering angle, left positive.
+    pub steering_rad: Vec<f64>,
+    /// Longitudinal acceleration (specific force), smoothed; from speed and yaw rate where none is recorded.
+    pub a_x_mps2: Vec<f64>,
+    /// Commanded longitudinal force over the nominal mass; without a command the acceleration.
+    pub force_x_mps2: Vec<f64>,
+    /// Distance along the lap over its length; 0 without a pose.
+    pub lap_share: Vec<f64>,
+    /// Heading of the pose; 0 without one.
+    pub heading_rad: Vec<f64>,
+    /// Where on the course, as an angle: of the distance along it, without a pose the heading.
+    pub place_rad: Vec<f64>,
+    /// Lateral velocity and yaw rate, smoothed: what slips were before a window starts.
+    pub smooth: [Vec<f64>; 2],
+    /// Measured signals by channel, in the order of [`Recording::channels`].
+    pub measured: Vec<Vec<f64>>,
+}
+
+impl Run {
+    /// Samples.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.v_x_mps.len()
+    }
+
+    /// Whether there are no samples.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.v_x_mps.is_empty()
+    }
+
+    /// Time of sample `k` since the recording's first.
+    #[must_use]
+    pub fn time_s(&self, k: usize) -> f64 {
+        self.start_time_s + k as f64 * self.dt_s
+    }
+}
+
+/// A recording, ready to be diagnosed.
+#[derive(Debug, Clone)]
+pub struct Recording {
+    /// Its even stretches.
+    pub runs: Vec<Run>,
+    /// The channels that are explained.
+    pub channels: Vec<Channel>,
+    /// Standard deviation of each channel's noise; infinite where a channel is fitted and not scored.
+    pub sigma: Vec<f64>,
+    /// What residuals are divided by when fitting: noise, and a share of the signal's own size that no single-track model gets right.
+    pub weights: Vec<f64>,
+    /// Places on the course.
+    pub laps: Laps,
+    /// Whether a longitudinal command is recorded.
+    pub has_command: bool,
+    /// Whether the lateral acceleration was computed from v_y, v_x and r instead of measured.
+    pub derived_a_y: bool,
+    /// Time recorded.
+    pub recorded_s: f64,
+    /// Slowest speed that is used.
+    pub least_speed_mps: f64,
+    /// The kinematic identities on it.
+    pub identities: Vec<crate::Identity>,
+}
+
+/// Time that a recording needs to tell anything.
+pub const NEEDED_S: f64 = 8.0;
+/// Length of the windows that are fitted, and over which channels that drift count.
+pub const WINDOW_S: f64 = 0.5;
+/// Stretches shorter than this are left out.
+const SHORTEST_S: f64 = 1.5;
+/// Speed and longitudinal acceleration are smoothed over this time to each side.
+const SMOOTH_S: f64 = 0.06;
+
+/// Share of a signal's size that a single-track model is not expected to get right.
+const MODEL_SHARE: f64 = 0.02;
+
+impl Recording {
+    /// Prepares a recording.
+    ///
+    /// # Errors
+    /// What is wrong with the telemetry; [`ModelError::TooCoarse`] below 15 Hz.
+    pub fn new(sequence: &StateSequence) -> Result<Self, ModelError> {
+        Self::beside(sequence, None)
+    }
+
+    /// Prepares a recording whose places are those of another one, where both are of one course.
+    ///
+    /// # Errors
+    /// As for [`Self::new`].
+    pub fn beside(sequence: &StateSequence, other: Option<&Self>) -> Result<Self, ModelError> {
+        const LEAST_RATE_HZ: f64 = 15.0;
+        let parts = segments(sequence, SHORTEST_S)?;
+        let recorded_s = sequence.duration_s();
+        let all_v: Vec<f64> = parts.iter().flat_map(|s| s.v_x_mps.iter().copied()).collect();
+        let least_speed_mps = (0.25 * quantile(all_v, 0.9)).max(0.5);
+        let Some(first) = parts.first() else {
+            return Err(ModelError::TooLittle {
+                usable_s: 0.0,
+                recorded_s,
+                needed_s: NEEDED_S,
+                least_speed_mps,
+            });
+        };
+        let dt_s = first.dt_s;
+        if dt_s > 1.0 / LEAST_RATE_HZ {
+            return Err(ModelError::TooCoarse { rate_hz: 1.0 / dt_s, needed_hz: LEAST_RATE_HZ });
+        }
+        let laps = stations(&parts, other.map(|o| &o.laps));
+        let has_command = !first.command_acceleration_mps2.is_empty();
+        let identities = crate::identities::check(&parts);
+        let channels = channels(first, has_command, &identities);
+        let runs: Vec<Run> =
+            parts.iter().zip(&laps.share).map(|(s, share)| run(s, &laps, share, &channels)).collect();
+        let mut sigma: Vec<f64> = (0..channels.len()).map(|c| crate::noise::sigma(&runs, c)).collect();
+        if let Some(c) = channels.iter().position(|c| *c == Channel::Heading) {
+            sigma[c] = sigma[c].max(crate::noise::heading_wander(&runs, c, 1));
+        }
+        let sigma: Vec<f64> = (0..channels.len())
+            .map(|c| if channels[c].scored() { sigma[c] } else { f64::INFINITY })
+            .collect();
+        let weights: Vec<f64> = sigma
+            .iter()
+            .enumerate()
+            .map(|(c, s)| s.hypot(MODEL_SHARE * crate::noise::spread(&runs, c, channels[c].without_mean())))
+            .collect();
+        let weights = with_kinematic_weight(&channels, weights, &runs, &sigma);
+        let derived_a_y = identities.iter().any(|i| i.name == crate::identities::LATERAL && !i.informative);
+        Ok(Self {
+            runs,
+            channels,
+            sigma,
+            weights,
+            laps,
+            has_command,
+            derived_a_y,
+            recorded_s,
+            least_speed_mps,
+            identities,
+        })
+    }
+
+    /// Step between samples.
+    #[must_use]
+    pub fn dt_s(&self) -> f64 {
+        self.runs.first().map_or(0.01, |r| r.dt_s)
+    }
+
+    /// Median speed of the samples that count.
+    pub fn typical_speed_mps(&self) -> f64 {
+        let fast =
+            self.runs.iter().flat_map(|r| r.v_x_mps.iter().copied()).filter(|v| *v > self.least_speed_mps);
+        median(fast.collect())
+    }
+}
+
+/// Which channels there are, and say something of their own.
+fn channels(segment: &Segment, has_command: bool, identities: &[crate::Identity]) -> Vec<Channel> {
+    let independent = |name: &str| identities.iter().any(|i| i.name == name && i.informative);
+    let has = |c: Channel| match c {
+        Channel::LateralVelocity | Channel::YawRate => true,
+        Channel::LateralAcceleration => !segment.a_y_mps2.is_empty(),
+        Channel::Gyro => {
+            !segment.gyro_yaw_rate_radps.is_empty()
+                && differs(&segment.gyro_yaw_rate_radps, &segment.yaw_rate_radps)
+        }
+        Channel::Heading => !segment.yaw_rad.is_empty() && independent(crate::identities::HEADING),
+        Channel::LongitudinalAcceleration => has_command && !segment.a_x_mps2.is_empty(),
+        Channel::Speed => has_command,
+        Channel::LateralKinematics => !segment.a_y_mps2.is_empty() && independent(crate::identities::LATERAL),
+    };
+    Channel::ALL.into_iter().filter(|&c| has(c)).collect()
+}
+
+/// Whether two recordings of one quantity are two measurements: they differ by more than a part of their own fastest changes.
+fn differs(a: &[f64], b: &[f64]) -> bool {
+    const SHARE: f64 = 0.3;
+    let apart = median(a.iter().zip(b).map(|(x, y)| (x - y).abs()).collect());
+    let fast = median(a.windows(3).map(|w| (w[2] - 2.0 * w[1] + w[0]).abs()).collect()) / 6_f64.sqrt();
+    apart > SHARE * fast
+}
+
+fn run(s: &Segment, laps: &Laps, lap_share: &[f64], channels: &[Channel]) -> Run {
+    let half = (SMOOTH_S / s.dt_s).round().max(1.0) as usize;
+    let (v_x_mps, v_x_rate) = local_quadratic(&s.v_x_mps, half, s.dt_s);
+    let a_x_mps2 = if s.a_x_mps2.is_empty() {
+        (0..s.len()).map(|k| v_x_rate[k] - s.v_y_mps[k] * s.yaw_rate_radps[k]).collect()
+    } else {
+        local_quadratic(&s.a_x_mps2, half, s.dt_s).0
+    };
+    let force_x_mps2 = if s.command_acceleration_mps2.is_empty() {
+        a_x_mps2.clone()
+    } else {
+        s.command_acceleration_mps2.clone()
+    };
+    let measured = channels
+        .iter()
+        .map(|c| match c {
+            Channel::LateralVelocity => s.v_y_mps.clone(),
+            Channel::YawRate => s.yaw_rate_radps.clone(),
+            Channel::LateralAcceleration => s.a_y_mps2.clone(),
+            Channel::Gyro => s.gyro_yaw_rate_radps.clone(),
+            Channel::Heading => s.yaw_rad.clone(),
+            Channel::LongitudinalAcceleration => s.a_x_mps2.clone(),
+            Channel::Speed => s.v_x_mps.clone(),
+            Channel::LateralKinematics => kinematic(&v_x_mps, s),
+        })
+        .collect();
+    let heading_rad = if s.yaw_rad.is_empty() { vec![0.0; s.len()] } else { s.yaw_rad.clone() };
+    Run {
+        start_time_s: s.start_time_s,
+        dt_s: s.dt_s,
+        v_x_mps,
+        steering_rad: s.steering_rad.clone(),
+        a_x_mps2,
+        force_x_mps2,
+        lap_share: lap_share.to_vec(),
+        place_rad: if laps.lap_m > 0.0 {
+            lap_share.iter().map(|share| std::f64::consts::TAU * share).collect()
+        } else {
+            heading_rad.clone()
+        },
+        heading_rad,
+        smooth: [&s.v_y_mps, &s.yaw_rate_radps].map(|c| local_quadratic(c, half, s.dt_s).0),
+        measured,
+    }
+}
+
+/// v_y less the integral of a_y - v_x r.
+fn kinematic(v_x_mps: &[f64], s: &Segment) -> Vec<f64> {
+    let rate = |k: usize| s.a_y_mps2[k] - v_x_mps[k] * s.yaw_rate_radps[k];
+    let mut integral = 0.0;
+    (0..s.len())
+        .map(|k| {
+            if k > 0 {
+                integral += 0.5 * (rate(k) + rate(k - 1)) * s.dt_s;
+            }
+            s.v_y_mps[k] - integral
+        })
+        .collect()
+}
+
+/// The kinematic channel's weight from the noise of what it is made of, integrated over half a window.
+fn with_kinematic_weight(
+    channels: &[Channel],
+    mut weights: Vec<f64>,
+    runs: &[Run],
+    sigma: &[f64],
+) -> Vec<f64> {
+    let of = |channel| channels.iter().position(|&c| c == channel).map_or(0.0, |c| sigma[c]);
+    if let Some(place) = channels.iter().position(|&c| c == Channel::LateralKinematics) {
+        let v_x = median(runs.iter().flat_map(|r| r.v_x_mps.iter().copied()).collect());
+        let dt_s = runs.first().map_or(0.01, |r| r.dt_s);
+        let walk = (dt_s * WINDOW_S / 4.0).sqrt();
+        let rate = of(Channel::LateralAcceleration).hypot(v_x * of(Channel::YawRate));
+        let noise = of(Channel::LateralVelocity).hypot(rate * walk);
+        weights[place] = noise.hypot(MODEL_SHARE * crate::noise::spread(runs, 0, true));
+    }
+    weights
+}

@@ -1,0 +1,251 @@
+//! What the effects' hooks see and change: the terms of the equations of motion.
+
+use gripsight_vehicle::{GRAVITY_MPS2, Real, VehicleParameters};
+
+/// Constants of the car.
+#[derive(Debug, Clone, Copy)]
+pub struct Car<T> {
+    /// Mass.
+    pub mass_kg: T,
+    /// Mass that the vehicle file states: what commanded accelerations refer to.
+    pub nominal_mass_kg: f64,
+    /// Yaw inertia.
+    pub yaw_inertia_kgm2: T,
+    /// Centre of gravity to front axle.
+    pub l_f_m: T,
+    /// Centre of gravity to rear axle.
+    pub l_r_m: T,
+    /// How far the true centre of gravity lies ahead of the nominal one, where the sensors are.
+    pub cog_shift_m: T,
+    /// Relaxation length of the tires; 0: none.
+    pub relaxation_m: T,
+    /// Drag of the air over nominal mass and square of the speed.
+    pub drag_1pm: T,
+    /// True forward speed over the reported one.
+    pub speed_factor: T,
+    /// Grip of the front and the rear axle, D of the Magic Formula.
+    pub peak: [T; 2],
+    /// Share of drive and brake force at the front axle.
+    pub drive_front_share: f64,
+    /// Share of the brake force at the front axle.
+    pub brake_front_share: f64,
+}
+
+impl<T: Real> Car<T> {
+    /// The car as the vehicle file states it.
+    pub fn nominal(vehicle: &VehicleParameters, peak: [T; 2]) -> Self {
+        Self {
+            mass_kg: T::from(vehicle.mass_kg),
+            nominal_mass_kg: vehicle.mass_kg,
+            yaw_inertia_kgm2: T::from(vehicle.yaw_inertia_kgm2),
+            l_f_m: T::from(vehicle.l_f_m),
+            l_r_m: T::from(vehicle.l_r_m),
+            cog_shift_m: T::from(0.0),
+            relaxation_m: T::from(0.0),
+            drag_1pm: T::from(0.0),
+            speed_factor: T::from(1.0),
+            peak,
+            drive_front_share: vehicle.drive_front_share,
+            brake_front_share: vehicle.brake_front_share,
+        }
+    }
+
+    /// Distance between the axles.
+    pub fn wheelbase_m(&self) -> T {
+        self.l_f_m + self.l_r_m
+    }
+
+    /// The axles at rest.
+    pub fn axles_at_rest(&self) -> Axles<T> {
+        let weight_n = self.mass_kg * GRAVITY_MPS2;
+        let axle =
+            |load_n| Axle { load_n, steer_rad: T::from(0.0), grip: T::from(1.0), usable: T::from(1.0) };
+        Axles {
+            front: axle(weight_n * self.l_r_m / self.wheelbase_m()),
+            rear: axle(weight_n * self.l_f_m / self.wheelbase_m()),
+        }
+    }
+
+    /// Share of the longitudinal force at the front axle.
+    pub fn front_share(&self, driving: bool) -> f64 {
+        if driving { self.drive_front_share } else { self.brake_front_share }
+    }
+
+    /// The largest lateral acceleration that the tires give with these loads.
+    pub fn largest_a_y_mps2(&self, axles: &Axles<T>) -> T {
+        (self.peak[0] * axles.front.load_n + self.peak[1] * axles.rear.load_n) / self.mass_kg
+    }
+}
+
+/// One axle at an instant.
+#[derive(Debug, Clone, Copy)]
+pub struct Axle<T> {
+    /// Vertical load.
+    pub load_n: T,
+    /// Steering angle on top of the driver's.
+    pub steer_rad: T,
+    /// Factor on D at constant cornering stiffness.
+    pub grip: T,
+    /// Factor on the lateral force.
+    pub usable: T,
+}
+
+/// How much less a tire carries, per load, for every share of load that comes on top of the one at rest.
+const LOAD_SENSITIVITY: f64 = 0.1;
+
+impl<T: Real> Axle<T> {
+    /// The load as the tire makes use of it: a tire's force grows less than its load does (Pacejka, Tire and Vehicle Dynamics, section 4.3.1,
+    /// `p_Dy2`).
+    pub fn carried_n(&self, at_rest_n: T) -> T {
+        let more = self.load_n / at_rest_n - 1.0;
+        self.load_n * (-(more * LOAD_SENSITIVITY) + 1.0)
+    }
+}
+
+/// Both axles at an instant.
+#[derive(Debug, Clone, Copy)]
+pub struct Axles<T> {
+    /// Front axle.
+    pub front: Axle<T>,
+    /// Rear axle.
+    pub rear: Axle<T>,
+}
+
+/// What is known of an instant before the tires are asked.
+#[derive(Debug, Clone, Copy)]
+pub struct Moment<T> {
+    /// Forward speed.
+    pub v_x_mps: T,
+    /// Yaw rate.
+    pub yaw_rate_radps: T,
+    /// Lateral acceleration from the tires, a moment ago.
+    pub a_y_mps2: T,
+    /// The same behind the roll of the body.
+    pub rolled_a_y_mps2: T,
+    /// F_y/F_z of the front axle, a moment ago.
+    pub front_use: T,
+    /// Longitudinal acceleration (specific force).
+    pub a_x_mps2: f64,
+    /// Commanded longitudinal force over the nominal mass, or its stand-in, the longitudinal acceleration.
+    pub force_x_mps2: f64,
+    /// Time since the start of the recording.
+    pub minutes: f64,
+    /// Distance along the lap over the lap's length, in 0..1, or along the way driven where no lap was closed; 0 without a pose.
+    pub lap_share: f64,
+    /// Length of the lap, or of the way driven and a fifth more; 0 without a pose.
+    pub lap_m: f64,
+    /// Where on the course, as an angle that comes round once a lap: of the distance along it, without a pose the heading.
+    pub place_rad: f64,
+}
+
+/// Accelerations from outside the tires.
+#[derive(Debug, Clone, Copy)]
+pub struct Motion<T> {
+    /// On v_x and on an accelerometer alike (drag, rolling resistance).
+    pub force_x_mps2: T,
+    /// On v_x alone (gravity along the road).
+    pub gravity_x_mps2: T,
+    /// On v_y alone (gravity across the road).
+    pub gravity_y_mps2: T,
+    /// On v_y and on an accelerometer alike.
+    pub force_y_mps2: T,
+    /// On the yaw rate.
+    pub yaw_radps2: T,
+}
+
+impl<T: Real> Motion<T> {
+    /// Nothing from outside.
+    #[must_use]
+    pub fn none() -> Self {
+        let zero = T::from(0.0);
+        Self {
+            force_x_mps2: zero,
+            gravity_x_mps2: zero,
+            gravity_y_mps2: zero,
+            force_y_mps2: zero,
+            yaw_radps2: zero,
+        }
+    }
+}
+
+/// The motion of the car over a window, sample by sample, on its way to the recorded signals.
+#[derive(Debug, Clone)]
+pub struct Outputs<T> {
+    /// Step between samples.
+    pub dt_s: f64,
+    /// Lateral velocity at the odometry's point.
+    pub v_y_mps: Vec<T>,
+    /// Yaw rate of odometry and gyroscope.
+    pub yaw_rate_radps: Vec<T>,
+    /// Yaw acceleration.
+    pub yaw_acceleration_radps2: Vec<T>,
+    /// Specific force to the left.
+    pub a_y_mps2: Vec<T>,
+    /// Specific force forward.
+    pub a_x_mps2: Vec<T>,
+    /// Forward speed, but for a constant.
+    pub v_x_mps: Vec<T>,
+    /// Heading, but for a constant.
+    pub heading_rad: Vec<T>,
+}
+
+/// A first-order lag over a step in which its input is linear: exact, and at `tau_s` = 0 exactly the input, with the right derivative.
+///
+/// tau y' + y = u,  u = u0 + s t:  y(h) = u1 - s tau + (y0 - u0 + s tau) exp(-h/tau)
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lag<T> {
+    h_s: f64,
+    tau_s: T,
+    /// exp(-h/tau); nothing where it is nil.
+    decay: Option<T>,
+}
+
+impl<T: Real> Lag<T> {
+    pub(crate) fn new(h_s: f64, tau_s: T) -> Self {
+        let slow = tau_s.re() >= h_s / 30.0;
+        Self { h_s, tau_s, decay: slow.then(|| (-(tau_s.recip() * h_s)).exp()) }
+    }
+
+    /// The output after a step in which the input goes from `u0` to `u1`.
+    pub(crate) fn step(&self, y0: T, u0: T, u1: T) -> T {
+        let ramp = (u1 - u0) / self.h_s * self.tau_s;
+        let settled = u1 - ramp;
+        match self.decay {
+            Some(decay) => settled + (y0 - u0 + ramp) * decay,
+            None => settled,
+        }
+    }
+}
+
+/// A series `delay_s` later, linear between samples; before the first sample it is taken as going on straight.
+pub(crate) fn delayed<T: Real>(series: &[T], delay_s: T, dt_s: f64) -> Vec<T> {
+    let n = series.len();
+    if n < 2 {
+        return series.to_vec();
+    }
+    let shift = delay_s / dt_s;
+    (0..n)
+        .map(|k| {
+            if shift.re().abs() < 1e-9 {
+                let (a, b) = (k.saturating_sub(1), (k + 1).min(n - 1));
+                return series[k] - (series[b] - series[a]) / (b - a) as f64 * shift;
+            }
+            let place = -shift + k as f64;
+            let left = (place.re().floor().max(0.0) as usize).min(n - 2);
+            series[left] + (series[left + 1] - series[left]) * (place - left as f64)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tire_makes_less_of_more_load() {
+        let carried = |load_n: f64| Axle { load_n, steer_rad: 0.0, grip: 1.0, usable: 1.0 }.carried_n(1000.0);
+        approx::assert_relative_eq!(carried(1000.0), 1000.0);
+        approx::assert_relative_eq!(carried(1100.0), 1100.0 * 0.99);
+        approx::assert_relative_eq!(carried(800.0), 800.0 * 1.02);
+    }
+}
