@@ -159,3 +159,17 @@ fn cmake_lists_every_message() {
         .collect();
     assert_eq!(listed, known.iter().map(String::as_str).collect());
 }
+
+/// The message's arrays are the one table's channels, in its order, with its units and meanings.
+#[test]
+fn a_sequence_carries_the_channels_of_the_table() {
+    let text = definition(StateSequence::TYPE).unwrap();
+    let arrays: Vec<(&str, &str)> = text
+        .lines()
+        .filter_map(|line| line.strip_prefix("float32[] ")?.split_once(" # "))
+        .map(|(name, comment)| (name.trim(), comment))
+        .collect();
+    let table: Vec<(&str, String)> =
+        gripsight_signals::CHANNELS.iter().map(|c| (c.name, format!("[{}] {}", c.unit, c.meaning))).collect();
+    assert_eq!(arrays, table.iter().map(|(n, c)| (*n, c.as_str())).collect::<Vec<_>>());
+}

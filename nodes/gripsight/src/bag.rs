@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use gripsight_bag::effect::{EFFECTS, Effect};
 use gripsight_bag::{BagInfo, ReadReport, Role, TopicMap, Usable};
-use gripsight_report::topic_notes;
 use gripsight_signals::DataHealth;
 
 use crate::Outcome;
+use crate::notes::read_notes;
 
 /// Look into a bag, rewrite a damaged one, or inject a known effect.
 #[derive(Debug, Args)]
@@ -138,19 +138,7 @@ fn usable(report: &ReadReport) -> String {
         let topic = report.streams.topic(role).unwrap_or("not recorded");
         let _ = writeln!(text, "  {:7} {topic}", role.name());
     }
-    text.extend(topic_notes(&report.topics).iter().map(|note| format!("  {note}\n")));
-    for (count, what) in [
-        (
-            report.without_content,
-            "messages say nothing: joints that are not the four wheels, or not measured",
-        ),
-        (report.without_drive, "odometry messages left out: no drive command in force"),
-        (report.duplicates, "messages left out: a stamp seen before"),
-    ] {
-        if count > 0 {
-            let _ = writeln!(text, "  {count} {what}");
-        }
-    }
+    text.extend(read_notes(report).iter().map(|note| format!("  {note}\n")));
     text
 }
 

@@ -12,13 +12,14 @@ use gripsight_diagnosis::{Diagnosis, Earlier, ExtendedModelFile, Request, Verdic
 use gripsight_identification::export::{read_tires, stamp_text};
 use gripsight_identification::vehicle_hash;
 use gripsight_model::EffectId;
-use gripsight_report::{GapInput, Header, TopicUse, gap_page, gap_text, topic_notes, topic_uses};
+use gripsight_report::{GapInput, Header, TopicUse, gap_page, gap_text, topic_uses};
 use gripsight_signals::{StateSequence, WindowConfig};
 use gripsight_vehicle::VehicleParameters;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use crate::invocation::{file_name, invocation};
+use crate::notes::read_notes;
 use crate::predictions::{self, Written};
 use crate::{Outcome, outputs};
 
@@ -140,10 +141,10 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     let diagnosing_s = start.elapsed().as_secs_f64() - reading_s;
     let header = header(subject, &vehicle, &sequence);
     let compared_with = args.bag2.as_ref().map(|_| file_name(&args.bag));
-    let mut notes = data_notes(&report);
+    let mut notes = read_notes(&report);
     for (path, beside) in [(Some(&args.bag), &first), (args.heldout.as_ref(), &held_out)] {
         if let (Some(path), Some((_, report))) = (path, beside) {
-            notes.extend(data_notes(report).iter().map(|note| format!("{}: {note}", file_name(path))));
+            notes.extend(read_notes(report).iter().map(|note| format!("{}: {note}", file_name(path))));
         }
     }
     let page = gap_page(&GapInput {
@@ -252,17 +253,4 @@ fn header(bag: &Path, vehicle: &VehicleParameters, sequence: &StateSequence) -> 
         seed: None,
         command: invocation(std::env::args()),
     }
-}
-
-/// What reading the bag met, in sentences.
-fn data_notes(report: &ReadReport) -> Vec<String> {
-    let mut notes: Vec<String> = report.truncated.clone().into_iter().collect();
-    notes.extend(topic_notes(&report.topics));
-    if report.without_drive > 0 {
-        notes.push(format!("{} odometry messages left out: no drive command in force", report.without_drive));
-    }
-    if report.duplicates > 0 {
-        notes.push(format!("{} messages left out: a stamp seen before", report.duplicates));
-    }
-    notes
 }

@@ -14,6 +14,7 @@ mod diagnose;
 mod friction;
 mod identify;
 mod invocation;
+mod notes;
 mod outputs;
 mod predictions;
 mod simulate;

@@ -177,6 +177,7 @@ fn write_bag(path: &Path, recording: &Recording, seed: u64) -> anyhow::Result<us
             Measurement::Drive(m) => bag.write("/drive", stamp_ns, &encode::drive(&m))?,
             Measurement::Imu(m) => bag.write("/imu/data", stamp_ns, &encode::imu(&m))?,
             Measurement::Wheels(m) => bag.write("/wheel_speeds", stamp_ns, &encode::wheels(&m))?,
+            Measurement::Mapped(_) => {}
         }
     }
     for exposure in exposures {

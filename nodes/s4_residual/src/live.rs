@@ -6,11 +6,8 @@ use gripsight_identification_messages as messages;
 use gripsight_msgs::Residual;
 use gripsight_msgs::standard::std_msgs::Header;
 use gripsight_runtime::Publisher;
-use gripsight_signals::{AlignConfig, Aligner, Measurement, SignalError};
+use gripsight_signals::{AlignConfig, Aligner, Measurement, Pushed};
 use gripsight_vehicle::VehicleParameters;
-
-/// A stamp that goes back further than this means that the clock was set back; less is one late message.
-const CLOCK_JUMP_S: f64 = 1.0;
 
 /// Follows the car with the newest model; says nothing until there is one.
 pub(crate) struct Live {
@@ -41,10 +38,7 @@ impl Live {
 
     /// Takes a message of the car and publishes what it completes. What is wrong with messages, `telemetry` reports.
     pub(crate) async fn take(&mut self, measurement: Measurement) {
-        if let Err(SignalError::StampWentBack { back_s, .. }) = self.aligner.push(measurement)
-            && back_s > CLOCK_JUMP_S
-        {
-            self.aligner = Aligner::new(AlignConfig::default());
+        if self.aligner.push(measurement) == Ok(Pushed::ClockJumped) {
             self.residual.iter_mut().for_each(LiveResidual::reset);
         }
         while let Some(sample) = self.aligner.poll() {

@@ -153,6 +153,7 @@ impl LiveCar {
                 Measurement::Odometry(m) => out.odometry.publish(&encode::odometry(&m)).await,
                 Measurement::Imu(m) => out.imu.publish(&encode::imu(&m)).await,
                 Measurement::Wheels(m) => out.wheels.publish(&encode::wheels(&m)).await,
+                Measurement::Mapped(_) => {}
                 Measurement::Drive(m) => {
                     if let Some(drive) = &out.drive {
                         drive.publish(&encode::drive(&m)).await;

@@ -1,11 +1,6 @@
 //! What the node holds: the streams on their way to a window. No ROS, no clock.
 
-use gripsight_signals::{
-    AlignConfig, Aligner, Measurement, SignalError, StateSequence, WindowConfig, WindowCutter,
-};
-
-/// A stamp that goes back further than this means that the clock was set back (a bag started again); less is one late message.
-const CLOCK_JUMP_S: f64 = 1.0;
+use gripsight_signals::{Layout, Measurement, Sequencer, SignalError, StateSequence, WindowConfig};
 
 /// Counts for the diagnostics.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -25,69 +20,45 @@ pub(crate) struct Counts {
 /// Aligns the streams and cuts windows, by the rules that the offline command follows.
 pub(crate) struct Buffer {
     window: WindowConfig,
-    aligner: Aligner,
-    cutter: WindowCutter,
-    late_or_bad: usize,
-    earlier: Counts,
+    sequencer: Sequencer,
+    sequences: usize,
     /// What was wrong with the last message that was left out.
     pub(crate) last_problem: Option<String>,
 }
 
 impl Buffer {
-    pub(crate) fn new(window: WindowConfig) -> Result<Self, SignalError> {
-        Ok(Self {
-            window,
-            aligner: Aligner::new(AlignConfig::default()),
-            cutter: WindowCutter::new(window)?,
-            late_or_bad: 0,
-            earlier: Counts::default(),
-            last_problem: None,
-        })
+    pub(crate) fn new(window: WindowConfig, layout: Layout) -> Result<Self, SignalError> {
+        Ok(Self { window, sequencer: Sequencer::new(window, layout)?, sequences: 0, last_problem: None })
     }
 
     /// Takes a message; gives the windows that it closes.
     pub(crate) fn push(&mut self, message: Measurement) -> Vec<StateSequence> {
-        if let Err(error) = self.aligner.push(message) {
-            self.last_problem = Some(error.to_string());
-            match error {
-                SignalError::StampWentBack { back_s, .. } if back_s > CLOCK_JUMP_S => {
-                    tracing::warn!("the clock jumped back by {back_s:.3} s: starting over");
-                    self.start_over();
-                    return self.push(message);
-                }
-                _ => self.late_or_bad += 1,
-            }
-            return Vec::new();
+        let jumps = self.sequencer.taken().clock_jumps;
+        let (closed, problem) = self.sequencer.push(message);
+        if let Some(problem) = problem {
+            self.last_problem = Some(problem.to_string());
         }
-        let mut closed = Vec::new();
-        while let Some(sample) = self.aligner.poll() {
-            closed.extend(self.cutter.push(sample));
+        if self.sequencer.taken().clock_jumps > jumps {
+            tracing::warn!("the clock jumped back: starting over");
         }
-        self.earlier.sequences += closed.len();
+        self.sequences += closed.len();
         closed
     }
 
     /// Samples in the window still open, and how long it is to be.
     pub(crate) fn filling(&self) -> (usize, f64) {
-        (self.cutter.buffered(), self.window.length_s)
+        (self.sequencer.buffered(), self.window.length_s)
     }
 
     pub(crate) fn counts(&self) -> Counts {
-        let taken = self.aligner.counts();
+        let taken = self.sequencer.taken();
         Counts {
-            taken: std::array::from_fn(|i| self.earlier.taken[i] + taken[i]),
-            rejected: self.earlier.rejected + self.late_or_bad + self.aligner.duplicates(),
-            without_drive: self.earlier.without_drive + self.aligner.without_drive(),
-            ..self.earlier
+            taken: self.sequencer.aligner().counts(),
+            rejected: taken.left_out(),
+            without_drive: taken.without_drive,
+            clock_jumps: taken.clock_jumps,
+            sequences: self.sequences,
         }
-    }
-
-    /// Nothing from before a jump may be mixed with what comes after.
-    fn start_over(&mut self) {
-        self.earlier = Counts { clock_jumps: self.earlier.clock_jumps + 1, ..self.counts() };
-        self.late_or_bad = 0;
-        self.aligner = Aligner::new(AlignConfig::default());
-        self.cutter.clear();
     }
 }
 
@@ -112,7 +83,7 @@ mod tests {
     }
 
     fn buffer() -> Buffer {
-        Buffer::new(WindowConfig { length_s: 1.5, hop_s: 1.5 }).unwrap()
+        Buffer::new(WindowConfig { length_s: 1.5, hop_s: 1.5 }, Layout::default()).unwrap()
     }
 
     #[test]

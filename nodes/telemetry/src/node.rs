@@ -9,7 +9,7 @@ use gripsight_msgs::standard::sensor_msgs::{Imu, JointState};
 use gripsight_msgs::standard::std_msgs::Header;
 use gripsight_msgs::{Excitation as ExcitationMessage, Handshake, Range, StateSequence as SequenceMessage};
 use gripsight_runtime::{Descriptor, Node, Publisher, Qos};
-use gripsight_signals::{Excitation, Measurement, StateSequence, WindowConfig};
+use gripsight_signals::{Excitation, Layout, Measurement, StateSequence, WindowConfig};
 
 use crate::buffer::{Buffer, Counts};
 use crate::diagnostics::{Facts, status};
@@ -34,7 +34,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
             .read_only(),
     )?;
     let window = WindowConfig { length_s: length_s.get(), hop_s: hop_s.get().min(length_s.get()) };
-    let buffer = Buffer::new(window)?;
+    let buffer = Buffer::new(window, Layout::default())?;
 
     let sensor = node.sensor_qos(50);
     let mut odometry = node.subscription::<Odometry>("odom", sensor)?;

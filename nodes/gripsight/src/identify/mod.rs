@@ -26,6 +26,7 @@ use crate::Outcome;
 use crate::camera::{NetworkArgs, prior_of_bag};
 use crate::diagnose::extended_model;
 use crate::invocation::{file_name, invocation};
+use crate::notes::read_notes;
 use progress::{Progress, Timing};
 use windows::Windows;
 
@@ -290,20 +291,9 @@ fn write(
 
 /// What reading the bag met, in sentences.
 fn data_notes(report: &ReadReport, model: Option<&ExtendedModelFile>) -> Vec<String> {
-    let counted = [
-        (
-            report.without_content,
-            "messages say nothing: joints that are not the four wheels, or not measured",
-        ),
-        (report.without_drive, "odometry messages left out: no drive command in force"),
-        (report.duplicates, "messages left out: a stamp seen before"),
-    ];
-    let counted = counted.into_iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}"));
-    let recorded =
-        report.recorded_sequences.iter().map(|topic| format!("state sequences recorded on {topic}"));
     let corrected = model.map(|m| {
         let names: Vec<&str> = m.effects.keys().map(String::as_str).collect();
         format!("taken out of the signals before the tires were identified: {}", names.join(", "))
     });
-    report.truncated.clone().into_iter().chain(recorded).chain(counted).chain(corrected).collect()
+    read_notes(report).into_iter().chain(corrected).collect()
 }

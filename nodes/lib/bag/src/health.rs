@@ -71,5 +71,6 @@ fn values(measurement: &Measurement) -> (Role, Vec<(&'static str, f64)>) {
             let names = ["wheel_speed_fl", "wheel_speed_fr", "wheel_speed_rl", "wheel_speed_rr"];
             (Role::Wheels, names.into_iter().zip(m.speed).collect())
         }
+        Measurement::Mapped(_) => (Role::Odom, Vec::new()),
     }
 }

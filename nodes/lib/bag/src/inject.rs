@@ -73,7 +73,7 @@ fn read_series(bag: &Bag, streams: &Streams) -> Result<Series, BagError> {
             Some(Measurement::Odometry(m)) => series.odometry.push(m),
             Some(Measurement::Drive(m)) => series.drive.push(m),
             Some(Measurement::Imu(m)) => series.imu.push(m),
-            Some(Measurement::Wheels(_)) | None => {}
+            Some(Measurement::Wheels(_) | Measurement::Mapped(_)) | None => {}
         }
     }
     Ok(series)

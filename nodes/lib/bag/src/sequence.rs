@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use gripsight_msgs::standard::std_msgs::Header;
 use gripsight_msgs::{Handshake, StateSequence as Wire};
-use gripsight_signals::StateSequence;
+use gripsight_signals::{Clock, StateSequence};
 
 use crate::{Bag, BagError, decode, encode, from_cdr};
 
@@ -15,7 +15,6 @@ use crate::{Bag, BagError, decode, encode, from_cdr};
 pub const CHUNK_LIMIT_BYTES: usize = 60_000;
 /// Sequences that a [`Reassembler`] holds open or remembers as done.
 const KEPT: usize = 16;
-const CHANNELS: usize = 19;
 
 /// A sequence as it travelled, with the run it belongs to.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,16 +29,19 @@ pub struct RecordedSequence {
 /// its pose.
 #[must_use]
 pub fn sequence_to_messages(sequence: &StateSequence, handshake: &Handshake, frame_id: &str) -> Vec<Wire> {
-    let channels = channels(sequence);
-    let recorded = channels.iter().filter(|c| !c.is_empty()).count();
+    let channels = sequence.table();
+    let values: usize = channels.iter().map(|(_, values)| values.len()).sum();
     let texts = frame_id.len() + handshake.run_id.len() + handshake.vehicle_hash.len();
-    let room = CHUNK_LIMIT_BYTES.saturating_sub(texts + 512);
-    let per_chunk = (room / (size_of::<f32>() * recorded.max(1))).max(1);
-    let chunks = sequence.len().div_ceil(per_chunk).max(1);
+    // A share of each clock's stamps goes into each part; a share that does not divide evenly is one value longer, and so is padding.
+    let room = CHUNK_LIMIT_BYTES.saturating_sub(texts + 512 + 2 * size_of::<f32>() * channels.len());
+    let chunks = (size_of::<f32>() * values).div_ceil(room.max(1)).max(1);
     let header = Header { stamp: encode::time(sequence.start_stamp_ns), frame_id: frame_id.to_owned() };
     let handshake = Handshake { sequence_id: sequence.sequence_id, ..handshake.clone() };
     let part = |chunk: usize| {
-        let range = chunk * per_chunk..((chunk + 1) * per_chunk).min(sequence.len());
+        let range = |clock: Clock| {
+            let len = sequence.stamps_s(clock).len();
+            chunk * len / chunks..(chunk + 1) * len / chunks
+        };
         let mut message = Wire {
             header: header.clone(),
             handshake: handshake.clone(),
@@ -47,8 +49,8 @@ pub fn sequence_to_messages(sequence: &StateSequence, handshake: &Handshake, fra
             chunks: chunks as u32,
             ..Wire::default()
         };
-        for (to, from) in wire_channels(&mut message).into_iter().zip(channels) {
-            *to = from.get(range.clone()).unwrap_or_default().to_vec();
+        for (to, (channel, from)) in message.channels_mut().into_iter().zip(&channels) {
+            *to = from.get(range(channel.clock)).unwrap_or_default().to_vec();
         }
         message
     };
@@ -124,97 +126,19 @@ fn join(parts: impl Iterator<Item = Wire>) -> RecordedSequence {
         if part.chunk == 0 {
             (whole.header, whole.handshake) = (part.header.clone(), part.handshake.clone());
         }
-        for (to, from) in wire_channels(&mut whole).into_iter().zip(wire_channels(&mut part)) {
+        for (to, from) in whole.channels_mut().into_iter().zip(part.channels_mut()) {
             to.append(from);
         }
     }
-    let taken = wire_channels(&mut whole).map(std::mem::take);
-    let [
-        time_s,
-        v_x_mps,
-        v_y_mps,
-        yaw_rate_radps,
-        steering_rad,
-        x_m,
-        y_m,
-        yaw_rad,
-        a_x_mps2,
-        a_y_mps2,
-        rest @ ..,
-    ] = taken;
-    let [gyro_yaw_rate_radps, command_speed_mps, command_acceleration_mps2, fl, fr, rl, rr, front, rear] =
-        rest;
-    let sequence = StateSequence {
+    let mut sequence = StateSequence {
         sequence_id: whole.handshake.sequence_id,
         start_stamp_ns: decode::stamp_ns(whole.header.stamp),
-        time_s,
-        v_x_mps,
-        v_y_mps,
-        yaw_rate_radps,
-        steering_rad,
-        x_m,
-        y_m,
-        yaw_rad,
-        a_x_mps2,
-        a_y_mps2,
-        gyro_yaw_rate_radps,
-        command_speed_mps,
-        command_acceleration_mps2,
-        wheel_speed: [fl, fr, rl, rr],
-        wheel_effort_nm: [front, rear],
+        ..StateSequence::default()
     };
+    for ((_, to), from) in sequence.table_mut().into_iter().zip(whole.channels_mut()) {
+        std::mem::swap(to, from);
+    }
     RecordedSequence { handshake: whole.handshake, sequence }
-}
-
-/// The channels in the order of [`wire_channels`].
-fn channels(s: &StateSequence) -> [&[f32]; CHANNELS] {
-    let [fl, fr, rl, rr] = &s.wheel_speed;
-    let [front, rear] = &s.wheel_effort_nm;
-    [
-        &s.time_s,
-        &s.v_x_mps,
-        &s.v_y_mps,
-        &s.yaw_rate_radps,
-        &s.steering_rad,
-        &s.x_m,
-        &s.y_m,
-        &s.yaw_rad,
-        &s.a_x_mps2,
-        &s.a_y_mps2,
-        &s.gyro_yaw_rate_radps,
-        &s.command_speed_mps,
-        &s.command_acceleration_mps2,
-        fl,
-        fr,
-        rl,
-        rr,
-        front,
-        rear,
-    ]
-}
-
-fn wire_channels(m: &mut Wire) -> [&mut Vec<f32>; CHANNELS] {
-    [
-        &mut m.time_s,
-        &mut m.v_x_mps,
-        &mut m.v_y_mps,
-        &mut m.yaw_rate_radps,
-        &mut m.steering_rad,
-        &mut m.x_m,
-        &mut m.y_m,
-        &mut m.yaw_rad,
-        &mut m.a_x_mps2,
-        &mut m.a_y_mps2,
-        &mut m.gyro_yaw_rate_radps,
-        &mut m.command_speed_mps,
-        &mut m.command_acceleration_mps2,
-        &mut m.wheel_speed_fl_radps,
-        &mut m.wheel_speed_fr_radps,
-        &mut m.wheel_speed_rl_radps,
-        &mut m.wheel_speed_rr_radps,
-        &mut m.wheel_effort_front_nm,
-        &mut m.wheel_effort_rear_nm,
-    ]
 }
 
 /// The sequences recorded under a topic in the order in which they became whole, and where the bag is cut off.

@@ -2,13 +2,11 @@
 
 use std::path::Path;
 
-use gripsight_signals::{
-    AlignConfig, Aligner, Measurement, SignalError, StateSequence, TopicHealth, WindowConfig, WindowCutter,
-};
+use gripsight_signals::{Layout, Measurement, Sequencer, StateSequence, Taken, TopicHealth, WindowConfig};
 use serde::Serialize;
 
 use crate::sequence::read_recorded;
-use crate::{Bag, BagError, Role, Streams, TopicMap, decode, health};
+use crate::{Bag, BagError, Streams, TopicMap, decode, health};
 
 /// What reading a bag met.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -22,18 +20,17 @@ pub struct ReadReport {
     pub topics: Vec<TopicHealth>,
     /// Messages that said nothing about their stream: joints that are not the four wheels, sensors that report "not measured".
     pub without_content: usize,
-    /// Odometry left out because no drive command was in force.
-    pub without_drive: usize,
-    /// Messages left out because their stamp stood there already.
-    pub duplicates: usize,
+    /// What became of the rest, and what was left out.
+    #[serde(flatten)]
+    pub taken: Taken,
     /// Where the bag is cut off, in words; what comes before was read.
     pub truncated: Option<String>,
     /// The topic of the recorded sequences that were used instead of the streams.
     pub recorded_sequences: Option<String>,
 }
 
-/// Every measurement of a bag in the order of recording. NaN and stamps that go back are found by the
-/// [`Aligner`](gripsight_signals::Aligner), not here.
+/// Every measurement of a bag in the order of recording. NaN and stamps that go back are left out
+/// by the [`Aligner`](gripsight_signals::Aligner), not here.
 ///
 /// # Errors
 /// [`BagError`]; a truncated bag is none: its whole messages are given, and the report says so.
@@ -101,36 +98,29 @@ pub(crate) fn sequences_of(
         return Ok((recorded.into_iter().map(|r| r.sequence).collect(), report));
     }
     let (measurements, mut report) = measurements_of(bag, topics)?;
-    let mut aligner = Aligner::new(AlignConfig::default());
-    let mut cutter = WindowCutter::new(window)?;
+    let mut sequencer = Sequencer::new(window, Layout::default())?;
     let mut sequences = Vec::new();
     for measurement in measurements {
-        let stream = measurement.stream();
-        aligner.push(measurement).map_err(|error| named(&report.streams, stream, error))?;
-        while let Some(sample) = aligner.poll() {
-            sequences.extend(cutter.push(sample));
+        sequences.extend(sequencer.push(measurement).0);
+    }
+    sequences.extend(sequencer.finish());
+    report.taken = sequencer.taken();
+    // The last window is open; what an infinite one held when the clock was set back stands before it.
+    if sequences.is_empty() || window.length_s.is_infinite() {
+        match sequencer.rest() {
+            Ok(rest) => sequences.push(rest),
+            Err(_) if sequences.is_empty() => {
+                return Err(BagError::NothingAligned {
+                    path: bag.path().to_owned(),
+                    odometry: report.counts[0],
+                    drive: report.counts[1],
+                    aligned: sequencer.buffered(),
+                    without_drive: report.taken.without_drive,
+                    duplicates: report.taken.duplicates,
+                });
+            }
+            Err(_) => {}
         }
     }
-    while let Some(sample) = aligner.drain() {
-        sequences.extend(cutter.push(sample));
-    }
-    report.without_drive = aligner.without_drive();
-    report.duplicates = aligner.duplicates();
-    if sequences.is_empty() {
-        sequences.push(cutter.rest().map_err(|_| BagError::NothingAligned {
-            path: bag.path().to_owned(),
-            odometry: report.counts[0],
-            drive: report.counts[1],
-            aligned: cutter.buffered(),
-            without_drive: report.without_drive,
-            duplicates: report.duplicates,
-        })?);
-    }
     Ok((sequences, report))
-}
-
-fn named(streams: &Streams, stream: &str, error: SignalError) -> BagError {
-    let role = Role::ALL.into_iter().find(|role| role.name() == stream);
-    let topic = role.and_then(|role| streams.topic(role)).unwrap_or(stream).to_owned();
-    BagError::Signal { topic, error }
 }

@@ -118,25 +118,7 @@ fn applied(sequence: &StateSequence, corrections: &[Correction], speed_factor: f
         add(&mut out.a_y_mps2, &here.a_y_mps2);
         out.v_x_mps[i] = (f64::from(out.v_x_mps[i]) * speed_factor) as f32;
     }
-    let channels = [
-        &mut out.time_s,
-        &mut out.v_x_mps,
-        &mut out.v_y_mps,
-        &mut out.yaw_rate_radps,
-        &mut out.steering_rad,
-        &mut out.x_m,
-        &mut out.y_m,
-        &mut out.yaw_rad,
-        &mut out.a_x_mps2,
-        &mut out.a_y_mps2,
-        &mut out.gyro_yaw_rate_radps,
-        &mut out.command_speed_mps,
-        &mut out.command_acceleration_mps2,
-    ];
-    for channel in channels.into_iter().chain(&mut out.wheel_speed).chain(&mut out.wheel_effort_nm) {
-        let mut keep = kept.iter();
-        channel.retain(|_| keep.next() == Some(&true));
-    }
+    out.retain(|i| kept[i]);
     out
 }
 

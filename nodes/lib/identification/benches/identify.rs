@@ -58,7 +58,7 @@ fn telemetry(stamp_ns: i64) -> TelemetrySample {
     let odometry =
         OdometrySample { stamp_ns, v_x_mps: 6.0, v_y_mps: -0.05, yaw_rate_radps: 1.0, ..Default::default() };
     let drive = DriveSample { stamp_ns, steering_angle_rad: 0.08, ..Default::default() };
-    TelemetrySample { odometry, drive, imu: None, wheels: None }
+    TelemetrySample { odometry, drive, ..TelemetrySample::default() }
 }
 
 criterion_group!(benches, whole);

@@ -19,9 +19,7 @@ pub enum SignalError {
         index: usize,
     },
     /// A stamp lies before the stamp of the message before it.
-    #[error(
-        "{topic}: the stamp goes back by {back_s:.6} s at message {index} (stamp {stamp_s:.6} s); sort the bag by stamp, or cut it there"
-    )]
+    #[error("{topic}: the stamp goes back by {back_s:.6} s at message {index} (stamp {stamp_s:.6} s)")]
     StampWentBack {
         /// Which stream.
         topic: &'static str,

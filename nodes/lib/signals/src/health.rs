@@ -73,11 +73,10 @@ impl DataHealth {
             frozen: frozen(sequence),
             moving_share: moving as f64 / sequence.len() as f64,
             recorded: sequence
-                .channels()
+                .table()
                 .into_iter()
-                .skip(5)
-                .filter(|(_, c)| !c.is_empty())
-                .map(|(n, _)| n)
+                .filter(|(channel, values)| !channel.required && !values.is_empty())
+                .map(|(channel, _)| channel.name)
                 .collect(),
         })
     }

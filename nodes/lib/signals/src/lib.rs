@@ -2,28 +2,39 @@
 //!
 //! The way of the data: [`Measurement`]s of several topics, each with its own stamps, are put on the stamps of the odometry
 //! by the [`Aligner`]; the [`WindowCutter`] cuts the aligned [`TelemetrySample`]s into [`StateSequence`]s (float32, the unit of
-//! work of the whole suite, live and offline); [`segments`] turns a sequence into evenly sampled stretches without gaps;
+//! work of the whole suite, live and offline; both by the [`Sequencer`]); [`segments`] turns a sequence into evenly sampled stretches without gaps;
 //! [`DataHealth`] says what is wrong with it.
 //!
 //! Frames follow REP-103: x forward, y left, z up; left steer and left yaw are positive.
 
 mod align;
+mod channels;
 mod error;
 mod excitation;
 mod health;
+mod layout;
 mod measurement;
 mod segment;
 mod sequence;
+mod sequencer;
+mod signal;
 mod topic;
 mod window;
 
-pub use align::{AlignConfig, Aligner};
+pub use align::{AlignConfig, Aligner, Pushed};
+pub use channels::{CHANNELS, Channel, Clock, Kind};
 pub use error::SignalError;
 pub use excitation::Excitation;
 pub use health::{DataHealth, FrozenSpan, Gap};
-pub use measurement::{DriveSample, ImuSample, Measurement, OdometrySample, TelemetrySample, WheelsSample};
+pub use layout::Layout;
+pub use measurement::{
+    DriveSample, ImuSample, MappedSample, Measurement, OdometrySample, PoseSample, TelemetrySample,
+    WheelsSample,
+};
 pub use segment::{Segment, segments};
-pub use sequence::StateSequence;
+pub use sequence::{Commands, Poses, StateSequence};
+pub use sequencer::{Sequencer, Taken, stamp_s};
+pub use signal::{Join, Signal, Values};
 pub use topic::{Pace, Spikes, TopicHealth};
 pub use window::{WindowConfig, WindowCutter};
 

@@ -2,38 +2,50 @@
 
 use crate::{SignalError, StateSequence};
 
-/// A stretch of one sequence on an even grid, as float64. Optional channels are empty where not recorded.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Segment {
-    /// Time of the first sample since the start of the sequence.
-    pub start_time_s: f64,
-    /// Step of the grid.
-    pub dt_s: f64,
-    /// Forward velocity.
-    pub v_x_mps: Vec<f64>,
-    /// Lateral velocity as measured.
-    pub v_y_mps: Vec<f64>,
-    /// Yaw rate as measured.
-    pub yaw_rate_radps: Vec<f64>,
-    /// Steering as recorded.
-    pub steering_rad: Vec<f64>,
-    /// Position relative to the start of the sequence.
-    pub x_m: Vec<f64>,
-    /// Position relative to the start of the sequence.
-    pub y_m: Vec<f64>,
-    /// Heading, unwrapped.
-    pub yaw_rad: Vec<f64>,
-    /// Specific force forward.
-    pub a_x_mps2: Vec<f64>,
-    /// Specific force to the left.
-    pub a_y_mps2: Vec<f64>,
-    /// Gyroscope's yaw rate.
-    pub gyro_yaw_rate_radps: Vec<f64>,
-    /// Commanded acceleration.
-    pub command_acceleration_mps2: Vec<f64>,
-    /// Wheel speeds as reported.
-    pub wheel_speed: [Vec<f64>; 4],
+/// Makes the struct of the rows on the odometry's stamps, and how it is filled.
+macro_rules! segment {
+    (@rows [$($done:tt)*] time_s, $clock:ident, $r:literal, $k:ident, $u:literal, $m:literal; $($rest:tt)*) => {
+        segment!(@rows [$($done)*] $($rest)*);
+    };
+    (@rows [$($done:tt)*] $name:ident, Samples, $r:literal, $k:ident, $u:literal, $m:literal; $($rest:tt)*) => {
+        segment!(@rows [$($done)* ($name, $u, $m)] $($rest)*);
+    };
+    (@rows [$($done:tt)*] $name:ident, $clock:ident, $r:literal, $k:ident, $u:literal, $m:literal; $($rest:tt)*) => {
+        segment!(@rows [$($done)*] $($rest)*);
+    };
+    (@rows [$(($name:ident, $unit:literal, $meaning:literal))*]) => {
+        /// A stretch of one sequence on an even grid, as float64. Optional channels are empty where not recorded.
+        #[derive(Debug, Clone, PartialEq, Default)]
+        pub struct Segment {
+            /// Time of the first sample since the start of the sequence.
+            pub start_time_s: f64,
+            /// Step of the grid.
+            pub dt_s: f64,
+            $(#[doc = concat!("[", $unit, "] ", $meaning)] pub $name: Vec<f64>,)*
+            /// [m/s] commanded speed in force
+            pub command_speed_mps: Vec<f64>,
+            /// [m/s^2] commanded acceleration in force
+            pub command_acceleration_mps2: Vec<f64>,
+        }
+
+        impl Segment {
+            /// Puts every channel of a sequence through `even`; what was commanded has been put on its samples before.
+            fn of(sequence: &StateSequence, held: &[Vec<f32>; 2], start_time_s: f64, dt_s: f64, even: &dyn Fn(&[f32]) -> Vec<f64>) -> Self {
+                let [speed_mps, acceleration_mps2] = held;
+                Self {
+                    start_time_s,
+                    dt_s,
+                    $($name: even(&sequence.$name),)*
+                    command_speed_mps: even(speed_mps),
+                    command_acceleration_mps2: even(acceleration_mps2),
+                }
+            }
+        }
+    };
+    ($($rows:tt)*) => { segment!(@rows [] $($rows)*); };
 }
+
+crate::for_each_channel!(segment);
 
 impl Segment {
     /// Number of samples.
@@ -81,17 +93,19 @@ pub fn segments(sequence: &StateSequence, min_length_s: f64) -> Result<Vec<Segme
         return Err(SignalError::Config { name: "median time step_s", must: "at least 1e-5", got: dt_s });
     }
     let time_s = &sequence.time_s;
+    let held = [&sequence.command_speed_mps, &sequence.command_acceleration_mps2]
+        .map(|values| held(sequence, values));
     let mut bounds = vec![0];
     bounds.extend((1..time_s.len()).filter(|&k| f64::from(time_s[k] - time_s[k - 1]) > GAP_STEPS * dt_s));
     bounds.push(time_s.len());
     Ok(bounds
         .windows(2)
         .filter(|w| f64::from(time_s[w[1] - 1] - time_s[w[0]]) >= min_length_s && w[1] - w[0] >= 2)
-        .map(|w| segment(sequence, w[0], w[1], dt_s))
+        .map(|w| segment(sequence, &held, w[0], w[1], dt_s))
         .collect())
 }
 
-fn segment(sequence: &StateSequence, from: usize, to: usize, dt_s: f64) -> Segment {
+fn segment(sequence: &StateSequence, held: &[Vec<f32>; 2], from: usize, to: usize, dt_s: f64) -> Segment {
     let time_s = &sequence.time_s[from..to];
     let start_time_s = f64::from(time_s[0]);
     let count = ((f64::from(time_s[time_s.len() - 1]) - start_time_s) / dt_s + 1e-2).floor() as usize + 1;
@@ -118,22 +132,14 @@ fn segment(sequence: &StateSequence, from: usize, to: usize, dt_s: f64) -> Segme
             })
             .collect()
     };
-    Segment {
-        start_time_s,
-        dt_s,
-        v_x_mps: even(&sequence.v_x_mps),
-        v_y_mps: even(&sequence.v_y_mps),
-        yaw_rate_radps: even(&sequence.yaw_rate_radps),
-        steering_rad: even(&sequence.steering_rad),
-        x_m: even(&sequence.x_m),
-        y_m: even(&sequence.y_m),
-        yaw_rad: even(&sequence.yaw_rad),
-        a_x_mps2: even(&sequence.a_x_mps2),
-        a_y_mps2: even(&sequence.a_y_mps2),
-        gyro_yaw_rate_radps: even(&sequence.gyro_yaw_rate_radps),
-        command_acceleration_mps2: even(&sequence.command_acceleration_mps2),
-        wheel_speed: std::array::from_fn(|w| even(&sequence.wheel_speed[w])),
-    }
+    Segment::of(sequence, held, start_time_s, dt_s, &even)
+}
+
+/// A commanded quantity at every sample: the command in force, the first one before it.
+fn held(sequence: &StateSequence, values: &[f32]) -> Vec<f32> {
+    let stamps_s = &sequence.command_time_s;
+    let at = |t_s: f32| values[stamps_s.partition_point(|&t| t <= t_s).saturating_sub(1)];
+    if values.is_empty() { Vec::new() } else { sequence.time_s.iter().map(|&t| at(t)).collect() }
 }
 
 #[cfg(test)]

@@ -1,6 +1,9 @@
 //! Cuts aligned telemetry into sequences, by stamps.
 
-use crate::{NS_PER_S, SignalError, StateSequence, TelemetrySample};
+use std::collections::VecDeque;
+
+use crate::sequence::HISTORY_S;
+use crate::{DriveSample, NS_PER_S, PoseSample, SignalError, StateSequence, TelemetrySample};
 
 /// How windows are cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,6 +29,8 @@ impl Default for WindowConfig {
 pub struct WindowCutter {
     config: WindowConfig,
     buffer: Vec<TelemetrySample>,
+    commands: VecDeque<DriveSample>,
+    poses: VecDeque<PoseSample>,
 }
 
 impl WindowCutter {
@@ -42,19 +47,32 @@ impl WindowCutter {
                 got: config.hop_s,
             });
         }
-        Ok(Self { config, buffer: Vec::new() })
+        Ok(Self { config, buffer: Vec::new(), commands: VecDeque::new(), poses: VecDeque::new() })
     }
 
     /// Takes a sample; gives the window that it closes.
     pub fn push(&mut self, sample: TelemetrySample) -> Option<StateSequence> {
         let full = self.buffer.first().is_some_and(|first| elapsed_s(first, &sample) >= self.config.length_s);
-        let closed = if full { StateSequence::from_samples(&self.buffer).ok() } else { None };
+        let closed = if full { self.rest().ok() } else { None };
         if full {
             let start = self.buffer[0];
             self.buffer.retain(|s| elapsed_s(&start, s) >= self.config.hop_s);
         }
         self.buffer.push(sample);
+        let from_ns = self.buffer[0].odometry.stamp_ns.saturating_sub((HISTORY_S * NS_PER_S) as i64);
+        drop_before(&mut self.commands, |c| c.stamp_ns < from_ns);
+        drop_before(&mut self.poses, |p| p.stamp_ns < from_ns);
         closed
+    }
+
+    /// Takes a command as it was received; before the samples that it holds for. Without any, the commands are those that the samples have.
+    pub fn push_command(&mut self, command: DriveSample) {
+        self.commands.push_back(command);
+    }
+
+    /// Takes a pose with a stamp of its own; before the first sample after it.
+    pub fn push_pose(&mut self, pose: PoseSample) {
+        self.poses.push_back(pose);
     }
 
     /// The window still open.
@@ -62,7 +80,12 @@ impl WindowCutter {
     /// # Errors
     /// [`SignalError::TooShort`] where it holds fewer than two samples.
     pub fn rest(&self) -> Result<StateSequence, SignalError> {
-        StateSequence::from_samples(&self.buffer)
+        if self.commands.is_empty() && self.poses.is_empty() {
+            return StateSequence::from_samples(&self.buffer);
+        }
+        let commands: Vec<DriveSample> = self.commands.iter().copied().collect();
+        let poses: Vec<PoseSample> = self.poses.iter().copied().collect();
+        StateSequence::from_parts(&self.buffer, &commands, &poses)
     }
 
     /// Samples in the window still open.
@@ -74,6 +97,14 @@ impl WindowCutter {
     /// Forgets everything: after the clock jumped back, nothing old may be mixed with what comes.
     pub fn clear(&mut self) {
         self.buffer.clear();
+        self.commands.clear();
+        self.poses.clear();
+    }
+}
+
+fn drop_before<T>(queue: &mut VecDeque<T>, is_old: impl Fn(&T) -> bool) {
+    while queue.front().is_some_and(&is_old) {
+        queue.pop_front();
     }
 }
 

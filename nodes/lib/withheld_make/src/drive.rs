@@ -45,13 +45,7 @@ pub(crate) fn ns(seconds: f64) -> i64 {
 }
 
 fn moved(mut measurement: Measurement, by_ns: i64) -> Measurement {
-    let stamp_ns = match &mut measurement {
-        Measurement::Odometry(m) => &mut m.stamp_ns,
-        Measurement::Drive(m) => &mut m.stamp_ns,
-        Measurement::Imu(m) => &mut m.stamp_ns,
-        Measurement::Wheels(m) => &mut m.stamp_ns,
-    };
-    *stamp_ns += by_ns;
+    *measurement.stamp_ns_mut() += by_ns;
     measurement
 }
 
@@ -65,6 +59,7 @@ pub(crate) fn write(path: &Path, measurements: &[Measurement]) -> Result<(), Wit
             Measurement::Drive(m) => bag.write("/drive", stamp_ns, &encode::drive(m))?,
             Measurement::Imu(m) => bag.write("/imu/data", stamp_ns, &encode::imu(m))?,
             Measurement::Wheels(m) => bag.write("/wheel_speeds", stamp_ns, &encode::wheels(m))?,
+            Measurement::Mapped(_) => {}
         }
     }
     Ok(bag.finish()?)

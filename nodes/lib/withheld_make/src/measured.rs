@@ -197,6 +197,7 @@ fn injected(measurements: &[Measurement], effects: &[Effect]) -> Vec<Measurement
             Measurement::Drive(m) => series.drive.push(*m),
             Measurement::Imu(m) => series.imu.push(*m),
             Measurement::Wheels(m) => wheels.push(*m),
+            Measurement::Mapped(_) => {}
         }
     }
     effects.iter().for_each(|effect| effect.apply(&mut series));

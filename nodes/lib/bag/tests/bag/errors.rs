@@ -2,7 +2,6 @@
 
 use gripsight_bag::{Bag, BagError, BagWriter, TopicMap, encode, read_sequences};
 use gripsight_msgs::standard::rosgraph_msgs::Clock;
-use gripsight_signals::SignalError;
 use tempfile::TempDir;
 
 use crate::support::{Channel, START_NS, WHOLE, drive, file, mcap_bytes, odometry, telemetry_bag};
@@ -194,18 +193,17 @@ fn samples_that_are_not_numbers_or_go_back() {
             writer.write("/drive", odometry(k).stamp_ns, &encode::drive(&drive(k))).unwrap();
         }
         writer.finish().unwrap();
-        read_sequences(&path, &TopicMap::default(), WHOLE).unwrap_err()
+        let (mut sequences, report) = read_sequences(&path, &TopicMap::default(), WHOLE).unwrap();
+        (sequences.remove(0).len(), report.taken)
     };
-    let error = write("nan.mcap", &|k, s| s.v_y_mps = if k == 20 { f64::NAN } else { 0.0 });
-    let BagError::Signal { topic, error: SignalError::NotFinite { index: 20, .. } } = &error else {
-        panic!("{error}")
-    };
-    assert_eq!(topic, "/odom");
-    let error = write("back.mcap", &|k, s| s.stamp_ns -= if k == 30 { 50_000_000 } else { 0 });
-    assert!(
-        matches!(&error, BagError::Signal { error: SignalError::StampWentBack { index: 30, .. }, .. }),
-        "{error}"
-    );
+    let (samples, taken) = write("nan.mcap", &|k, s| s.v_y_mps = if k == 20 { f64::NAN } else { 0.0 });
+    assert_eq!((samples, taken.not_finite), (49, 1));
+    assert!(taken.first_problem.unwrap().contains("odom: v_y_mps is NaN"));
+    let (samples, taken) = write("back.mcap", &|k, s| s.stamp_ns -= if k == 30 { 55_000_000 } else { 0 });
+    assert_eq!((samples, taken.out_of_order), (49, 1));
+    assert!((taken.most_back_s - 0.045).abs() < 1e-9, "{taken:?}");
+    let (samples, taken) = write("unset.mcap", &|k, s| s.stamp_ns *= i64::from(k != 30));
+    assert_eq!((samples, taken.out_of_order, taken.clock_jumps), (49, 1, 0));
 }
 
 #[test]

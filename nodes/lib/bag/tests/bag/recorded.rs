@@ -32,7 +32,11 @@ fn every_recorded_bag_reads_whole() {
         let (sequences, report) = read_sequences(&path, &TopicMap::default(), WHOLE).unwrap();
         let [sequence] = &sequences[..] else { panic!("{name}: {} sequences", sequences.len()) };
         assert_eq!(report.counts, counts, "{name}");
-        assert_eq!((report.without_drive, report.duplicates, &report.truncated), (0, 0, &None), "{name}");
+        assert_eq!(
+            (report.taken.left_out(), report.taken.without_drive, &report.truncated),
+            (0, 0, &None),
+            "{name}"
+        );
         assert_eq!(sequence.len(), counts[0], "{name}");
         assert!((sequence.duration_s() - length_s).abs() < 2.0, "{name}: {} s", sequence.duration_s());
         let health = gripsight_signals::DataHealth::of(sequence).unwrap();

@@ -5,7 +5,7 @@ use gripsight_bag::{
     sequence_to_messages, to_cdr,
 };
 use gripsight_msgs::Handshake;
-use gripsight_signals::{StateSequence, WindowConfig};
+use gripsight_signals::{Clock, Kind, StateSequence, WindowConfig};
 use proptest::prelude::*;
 use tempfile::TempDir;
 
@@ -15,26 +15,17 @@ use crate::support::{START_NS, WHOLE, telemetry_bag};
 fn sequence(len: usize, recorded: bool) -> StateSequence {
     let channel =
         |c: u32| (0..len).map(|k| f32::from_bits(0x3f00_0000 + c * 0x1_0000 + k as u32)).collect::<Vec<_>>();
-    let optional = |c| if recorded { channel(c) } else { Vec::new() };
-    StateSequence {
-        sequence_id: 77,
-        start_stamp_ns: START_NS + 1,
-        time_s: (0..len).map(|k| k as f32 * 0.01).collect(),
-        v_x_mps: channel(1),
-        v_y_mps: channel(2),
-        yaw_rate_radps: channel(3),
-        steering_rad: channel(4),
-        x_m: optional(5),
-        y_m: optional(6),
-        yaw_rad: optional(7),
-        a_x_mps2: optional(8),
-        a_y_mps2: optional(9),
-        gyro_yaw_rate_radps: optional(10),
-        command_speed_mps: channel(11),
-        command_acceleration_mps2: optional(12),
-        wheel_speed: [13, 14, 15, 16].map(optional),
-        wheel_effort_nm: [17, 18].map(optional),
+    let mut sequence =
+        StateSequence { sequence_id: 77, start_stamp_ns: START_NS + 1, ..StateSequence::default() };
+    for (c, (row, values)) in sequence.table_mut().into_iter().enumerate() {
+        let share = if row.clock == Clock::Samples { len } else { len / 2 };
+        if row.kind == Kind::Time && (recorded || row.required) {
+            *values = (0..share).map(|k| k as f32 * 0.01).collect();
+        } else if recorded || row.required {
+            *values = channel(c as u32)[..share].to_vec();
+        }
     }
+    sequence
 }
 
 fn handshake() -> Handshake {
@@ -43,7 +34,7 @@ fn handshake() -> Handshake {
 
 #[test]
 fn no_message_is_over_the_limit_and_chunks_are_few() {
-    for (recorded, len, chunks) in [(true, 3000, 4), (false, 3000, 2), (true, 60_000, 77), (false, 2, 1)] {
+    for (recorded, len, chunks) in [(true, 3000, 5), (false, 3000, 2), (true, 60_000, 90), (false, 2, 1)] {
         let messages = sequence_to_messages(&sequence(len, recorded), &handshake(), "map");
         let longest = messages.iter().map(|m| to_cdr(m).unwrap().len()).max().unwrap();
         assert!(longest <= CHUNK_LIMIT_BYTES, "{longest}");
@@ -67,10 +58,10 @@ fn parts_that_do_not_fit_are_refused() {
 proptest! {
     /// Repeated, late and mixed parts give each sequence once and exactly.
     #[test]
-    fn parts_in_any_order(order in Just((0..9usize).collect::<Vec<_>>()).prop_shuffle(), repeats in prop::collection::vec(0..9usize, 0..20)) {
+    fn parts_in_any_order(order in Just((0..11usize).collect::<Vec<_>>()).prop_shuffle(), repeats in prop::collection::vec(0..11usize, 0..20)) {
         let [a, b] = [1, 2].map(|id| StateSequence { sequence_id: id, ..sequence(3000 + id as usize, true) });
         let mut parts: Vec<_> = [&a, &b].iter().flat_map(|s| sequence_to_messages(s, &handshake(), "map")).collect();
-        prop_assert_eq!(parts.len(), 8);
+        prop_assert_eq!(parts.len(), 10);
         parts.push(parts[2].clone());
         let mut reassembler = Reassembler::default();
         let mut whole = Vec::new();

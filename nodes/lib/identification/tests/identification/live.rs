@@ -26,7 +26,7 @@ fn samples(sequence: &StateSequence) -> Vec<TelemetrySample> {
             };
             let steering_angle_rad = f64::from(sequence.steering_rad[k]);
             let drive = DriveSample { stamp_ns, steering_angle_rad, ..DriveSample::default() };
-            TelemetrySample { odometry, drive, imu: None, wheels: None }
+            TelemetrySample { odometry, drive, ..TelemetrySample::default() }
         })
         .collect()
 }
