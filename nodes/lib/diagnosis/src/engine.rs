@@ -8,7 +8,6 @@ use gripsight_model::{
 };
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters, handling};
 
-use crate::priors::BACKGROUND;
 use crate::state::{Nominal, State};
 use crate::trust::TireTrust;
 
@@ -124,7 +123,7 @@ impl<'a> Engine<'a> {
 
     /// The effects of a model that claims `named`, in the order of its parameters.
     pub(crate) fn layout(&self, named: &[EffectId]) -> Vec<EffectId> {
-        let background = BACKGROUND.into_iter().filter(|e| !self.holds(*e));
+        let background = EffectId::background().filter(|e| !self.holds(*e));
         let held = self.held.iter().map(|(e, _)| *e);
         let silent = background.chain(held).filter(|e| !named.contains(e));
         silent.chain(named.iter().copied()).collect()

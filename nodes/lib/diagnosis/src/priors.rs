@@ -1,4 +1,4 @@
-//! What is known beforehand: bounds and priors of all parameters, and what any car has a little of.
+//! What is known beforehand: bounds and priors of all parameters.
 
 use gripsight_estimation::shooting::{Parameter, Prior};
 use gripsight_model::{BASE, EffectId, HOLD, TIRES, tires_to_parameters};
@@ -14,17 +14,6 @@ const PRIOR_SIZES: f64 = 3.0;
 /// Trust in the tires is one observation beside thousands of residuals, but the errors of a model within a window are all alike: so many
 /// residuals count as one when they argue against that trust.
 const RESIDUALS_PER_OBSERVATION: f64 = 30.0;
-/// What any real car does a little of: fitted beside the tires, within what is usual.
-pub(crate) const BACKGROUND: [EffectId; 5] = [
-    EffectId::TireRelaxation,
-    EffectId::LateralLoadTransfer,
-    EffectId::LongitudinalLoadTransfer,
-    EffectId::CombinedSlip,
-    EffectId::YawInertiaError,
-];
-/// What is usual, as a share of the wheel's radius (relaxation), of the height of the centre of gravity (longitudinal transfer), and of a
-/// size that matters (the others; of the yaw inertia, which is seldom measured, a tenth).
-const USUAL: [f64; 5] = [0.33, 0.27, 0.33, 0.14, 0.67];
 
 impl Engine<'_> {
     /// How far a state's tires lie from those handed over: root of the mean square in units of the trust.
@@ -42,14 +31,7 @@ impl Engine<'_> {
         if self.holds(effect) {
             return None;
         }
-        let place = BACKGROUND.iter().position(|e| *e == effect)?;
-        let size = self.size(&effect.spec().parameters[0]);
-        let scale = match effect {
-            EffectId::TireRelaxation => self.vehicle.wheel_radius_m.unwrap_or(0.6 * size),
-            EffectId::LongitudinalLoadTransfer => self.vehicle.h_cg_m,
-            _ => size,
-        };
-        Some(USUAL[place] * scale)
+        effect.usual(self.vehicle, self.size(&effect.spec().parameters[0]))
     }
 
     /// Bounds and priors of all parameters of a model; `values` is where a fit starts.
@@ -83,7 +65,7 @@ impl Engine<'_> {
             .collect();
         let dt_s = self.recording.dt_s();
         // A command that is late is a command, and held until the next; a measured angle is neither.
-        let commanded = effects.iter().any(|e| matches!(e, EffectId::SteeringDelay | EffectId::SteeringLag));
+        let commanded = effects.iter().any(|e| e.spec().of_a_command);
         out.push(Parameter {
             start: if commanded { 0.5 * dt_s } else { values[HOLD] },
             low: 0.0,

@@ -22,8 +22,6 @@ pub(crate) struct Found {
     pub(crate) costs: Vec<f64>,
 }
 
-/// A delay that is not enough, so that a lag is needed beside it, is a filter of higher order. It goes by the lag's name.
-const DELAY_AND_LAG: [EffectId; 2] = [EffectId::OdometryDelay, EffectId::OdometryLowPass];
 /// Rounds at most.
 const ROUNDS: usize = 8;
 /// Iterations of the fit after a change of the weights.
@@ -59,13 +57,13 @@ pub(crate) fn search(
         evidence.push(here);
         state = settled(engine, &next, windows);
         let found = state.named.len();
-        let [delay, lag] = DELAY_AND_LAG;
         let place = |e: EffectId| state.named.iter().position(|n| *n == e);
-        if let (Some(from), Some(to)) = (place(delay), place(lag)) {
+        let pair = |(from, e): (usize, &EffectId)| Some((*e, from, place(e.spec().goes_by?)?));
+        if let Some((part, from, to)) = state.named.iter().enumerate().find_map(pair) {
             // What was compared when the first of the two was found says how sure the pair is.
             evidence.remove(from.max(to));
-            state = without(engine, &state, delay, windows);
-            library.retain(|e| *e != delay);
+            state = without(engine, &state, part, windows);
+            library.retain(|e| *e != part);
         }
         lacking = drop_needless(engine, &mut state, &mut evidence, windows);
         newest_is_compared = state.named.len() == found;

@@ -100,26 +100,17 @@ fn half_widths(
     blocks: &[usize],
 ) -> Vec<f64> {
     let rows = state.rows(effect);
+    let recording = engine.recording;
+    let unknown =
+        |size: f64| effect.spec().unknown.sigma(size, recording.dt_s(), recording.typical_speed_mps());
     rows.clone()
         .zip(effect.spec().parameters)
         .map(|(j, spec)| {
             let error = standard_error(state, rows.clone(), j, blocks);
             let size = state.parameters[j] - spec.null;
-            NINETY * spread(error, size, engine.size(spec), drift).hypot(unknown(engine, effect, size))
+            NINETY * spread(error, size, engine.size(spec), drift).hypot(unknown(size))
         })
         .collect()
-}
-
-/// What no fit of the model can know of a size, as a standard deviation: by how much less than its load a tire's force grows, which the model
-/// takes as the same for every tire, and within a sample when the command and the inertial unit are read.
-fn unknown(engine: &Engine<'_>, effect: EffectId, size: f64) -> f64 {
-    const SENSITIVITY: f64 = 0.06;
-    const SAMPLES: f64 = 0.12;
-    match effect {
-        EffectId::LongitudinalLoadTransfer | EffectId::AeroDownforce => SENSITIVITY * size,
-        EffectId::ImuLeverArm => SAMPLES * engine.recording.dt_s() * engine.recording.typical_speed_mps(),
-        _ => 0.0,
-    }
 }
 
 /// Standard deviation of a size from the standard error of its fit, a size that matters, and its drift.

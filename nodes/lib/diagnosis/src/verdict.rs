@@ -131,11 +131,7 @@ impl Claim {
     /// Counts in how far the size in a `model` changes where what every car has besides it is fitted, too. Steady push along the car is shared
     /// between drag and rolling resistance, and where one of them is named the other is there as well.
     pub(crate) fn with_company(&mut self, engine: &Engine<'_>, model: &State, windows: &Windows) {
-        let beside = match self.effect {
-            EffectId::AeroDrag => EffectId::RollingResistance,
-            EffectId::RollingResistance => EffectId::AeroDrag,
-            _ => return,
-        };
+        let Some(beside) = self.effect.spec().company else { return };
         if !self.named || model.named.contains(&beside) || engine.holds(beside) {
             return;
         }

@@ -11,9 +11,9 @@
 //!
 //! # Adding an effect
 //!
-//! An effect is one type in `effects/` that implements [`Effect`]: its [`EffectSpec`] (name, equation, source, parameters with
-//! units, null value, bounds, size that matters, what must be recorded and driven) and the hooks that it needs, written for any
-//! `Real`, so that derivatives are exact. Say, a constant side force F_y = c m (a crab wind):
+//! An effect is one file in `effects/` with a type that implements [`Effect`]: its [`EffectSpec`] (name, equation, source, sites, parameters with
+//! units, null value, bounds, size that matters, what must be recorded and driven, and whatever rule concerns this effect alone) and the hooks
+//! that it needs, written for any `Real`, so that derivatives are exact. Say, a constant side force F_y = c m (a crab wind):
 //!
 //! ```ignore
 //! pub(super) struct SideForce;
@@ -24,6 +24,7 @@
 //!         "v_y' += c",
 //!         "steady cross wind, to first order",
 //!         "straights in both directions",
+//!         &[Site::RoadAndWind],
 //!         &[both_sides("c_mps2", "m/s2", [0.3, 0.3])],
 //!     );
 //!
@@ -33,8 +34,8 @@
 //! }
 //! ```
 //!
-//! One line in the list `library!` of `effects/mod.rs` adds it to the search, the file format, `--without` and the tests: at its null value it
-//! must leave the nominal model exactly as it was. If its derivative vanishes there, say `flat_at_null` and give `starts`.
+//! Two lines in `effects/mod.rs`, the file's and one in the list `library!`, add it to the search, the file format, `--without` and the tests:
+//! at its null value it must leave the nominal model exactly as it was. If its derivative vanishes there, say `flat_at_null` and give `starts`.
 
 mod correction;
 mod effects;
@@ -46,18 +47,20 @@ mod motion;
 pub mod noise;
 mod recording;
 mod rollout;
+mod site;
 mod smooth;
 mod station;
 mod terms;
 
 pub use correction::{Correction, CorrectionStream};
-pub use effects::{Effect, EffectId, EffectSpec, Need, ParameterSpec, Reported};
+pub use effects::{Effect, EffectId, EffectSpec, Lagging, Need, ParameterSpec, Reported, Unknown, Usual};
 pub use error::ModelError;
-pub use flexible::{Flexible, Room};
+pub use flexible::{Flexible, Group, Room};
 pub use identities::{HEADING, Identity, LATERAL};
 pub use model::{BASE, ExtendedModel, HOLD, TIRES, tires_from_parameters, tires_to_parameters};
 pub use recording::{Channel, NEEDED_S, Recording, Run, WINDOW_S};
 pub use rollout::{Rollout, Window, tile};
+pub use site::Site;
 pub use smooth::{local_quadratic, median, quantile};
 pub use station::Laps;
 pub use terms::{Axle, Axles, Car, Moment, Motion, Outputs};

@@ -244,12 +244,12 @@ impl Rollout for ExtendedModel<'_> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use gripsight_signals::StateSequence;
     use gripsight_vehicle::{GRAVITY_MPS2, Input, SingleTrack, State};
 
-    fn recording(seconds: usize) -> Recording {
+    pub(crate) fn recording(seconds: usize) -> Recording {
         let n = 100 * seconds;
         let at = |f: &dyn Fn(f32) -> f32| (0..n).map(|k| f(k as f32 * 0.01)).collect::<Vec<f32>>();
         let noise = |k: usize, size: f32| size * (((k * 7919 + 13) % 1009) as f32 / 504.5 - 1.0);
@@ -266,7 +266,7 @@ mod tests {
         Recording::new(&sequence).unwrap()
     }
 
-    fn tires() -> PacejkaParameters {
+    pub(crate) fn tires() -> PacejkaParameters {
         PacejkaParameters::from_array([7.0, 1.5, 1.0, 0.1, 8.0, 1.4, 0.95, -0.2])
     }
 

@@ -6,7 +6,7 @@
 use crate::rollout::Window;
 use gripsight_vehicle::{PacejkaParameters, Real};
 
-use crate::effects::EffectId;
+use crate::effects::Lagging;
 use crate::flexible::Push;
 use crate::model::ExtendedModel;
 use crate::terms::{Axle, Axles, Car, Lag, Moment, Motion, Outputs};
@@ -87,7 +87,7 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         window: &'m Window,
     ) -> Self {
         let (before, steering) = steering.split_at(run_in);
-        let has = |effect| model.effects.contains(&effect);
+        let lags = |what| model.effects.iter().any(|e| e.spec().lagging.contains(&what));
         Self {
             model,
             p,
@@ -97,8 +97,8 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
             before,
             steering,
             window,
-            relaxes: has(EffectId::TireRelaxation) && car.relaxation_m.re() >= 0.0,
-            rolls: has(EffectId::RollSteer),
+            relaxes: lags(Lagging::Slip) && car.relaxation_m.re() >= 0.0,
+            rolls: lags(Lagging::Roll),
         }
     }
 
@@ -223,10 +223,15 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         // The lap's end is not a place to interpolate across.
         let lap = &run.lap_share;
         let turn = lap[b] - lap[a];
+        let (v_x_mps, a_x_mps2) = (mix(&run.v_x_mps), mix(&run.a_x_mps2));
+        let flexible = self.model.flexible.as_ref();
+        let more =
+            flexible.and_then(|f| f.speed_factor(self.model.flexible_parameters(self.p), v_x_mps, a_x_mps2));
+        let true_mps = self.car.speed_factor * v_x_mps;
         Instant {
-            v_x_mps: self.car.speed_factor * mix(&run.v_x_mps),
+            v_x_mps: more.map_or(true_mps, |more| true_mps * more),
             steering_rad: self.steering[k] + (self.steering[next] - self.steering[k]) * share,
-            a_x_mps2: mix(&run.a_x_mps2),
+            a_x_mps2,
             force_x_mps2: run.force_x_mps2[a],
             minutes: (run.time_s(a) + share * run.dt_s) / 60.0,
             lap_share: lap[a] + (turn - turn.round()) * share,

@@ -1,31 +1,10 @@
-//! Effects inside the tire.
+//! A force along the tire takes from the force across it. Fitted as q = k^2, so that it can be seen from zero.
 
-use gripsight_vehicle::{GRAVITY_MPS2, Real};
+use gripsight_vehicle::Real;
 
-use super::{Effect, EffectId, EffectSpec, Reported, positive, spec};
+use super::{Effect, EffectSpec, Reported, positive, spec};
+use crate::site::Site;
 use crate::terms::{Axles, Car, Moment};
-
-/// The side force follows the slip angle with a lag of one relaxation length.
-#[derive(Debug)]
-pub(super) struct TireRelaxation;
-
-impl Effect for TireRelaxation {
-    const SPEC: EffectSpec = EffectSpec {
-        alike: &[EffectId::SteeringDelay, EffectId::SteeringLag],
-        starts: &[0.5, 0.15],
-        ..spec(
-            "tire_relaxation",
-            "sigma/v alpha' + alpha = alpha_ss (linearly: sigma/v F' + F = F_ss)",
-            "Pacejka, Tire and Vehicle Dynamics, 3rd ed., section 1.2.4 and chapter 7",
-            "steering above 1 Hz at low speed",
-            &[positive("sigma_m", "m", [0.08, 0.5])],
-        )
-    };
-
-    fn car<T: Real>(p: &[T], car: &mut Car<T>) {
-        car.relaxation_m += p[0];
-    }
-}
 
 /// A force along the tire takes from the force across it. Fitted as q = k^2, so that it can be seen from zero.
 #[derive(Debug)]
@@ -36,6 +15,7 @@ const LEAST_SQUARE: f64 = 0.01;
 
 impl Effect for CombinedSlip {
     const SPEC: EffectSpec = EffectSpec {
+        usual: Some(|_, size| 0.14 * size),
         reported: &[Reported { name: "k", unit: "1", value: |p| p[0].max(0.0).sqrt() }],
         starts: &[0.7],
         ..spec(
@@ -43,6 +23,7 @@ impl Effect for CombinedSlip {
             "F_y *= sqrt(max(0, 1 - (k F_x/(mu F_z))^2)) per axle",
             "friction ellipse; Pacejka, Tire and Vehicle Dynamics, 3rd ed., section 3.3",
             "braking and driving above 0.4 mu g with slip",
+            &[Site::FrontAxle, Site::RearAxle],
             &[positive("k_squared", "1", [0.7, 0.7])],
         )
     };
@@ -61,5 +42,21 @@ impl Effect for CombinedSlip {
     }
 }
 
-/// Standard gravity, for effects that are stated per g.
-pub(super) const PER_G: f64 = 1.0 / GRAVITY_MPS2;
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{assert_absent_at_null, car, moment};
+    use super::*;
+
+    #[test]
+    fn braking_takes_from_the_side_force_along_an_ellipse() {
+        assert_absent_at_null::<CombinedSlip>();
+        let (car, at) = (car(), moment());
+        let mut axles = car.axles_at_rest();
+        let at = Moment { force_x_mps2: -4.0, ..at };
+        CombinedSlip::grip(&[0.49], &car, &at, &mut axles);
+        let force_n = 4.0 * car.nominal_mass_kg * (1.0 - car.brake_front_share);
+        let used = 0.7 * force_n / (car.peak[1] * axles.rear.load_n);
+        approx::assert_relative_eq!(axles.rear.usable, (1.0 - used * used).sqrt(), epsilon = 1e-12);
+        assert_eq!((CombinedSlip::SPEC.reported[0].value)(&[0.49]), 0.7);
+    }
+}

@@ -1,9 +1,9 @@
-//! Effects between the recorded steering and the road wheels.
+//! The wheels follow the command through a servo: a lag of second order.
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectId, EffectSpec, ParameterSpec, Reported, both_sides, positive, spec};
-use crate::terms::delayed;
+use super::{Effect, EffectId, EffectSpec, ParameterSpec, positive, spec};
+use crate::site::Site;
 
 /// The wheels follow the command through a servo: a lag of second order.
 #[derive(Debug)]
@@ -14,6 +14,8 @@ const SHORT_LAG: f64 = 1.0 / 30.0;
 
 impl Effect for SteeringLag {
     const SPEC: EffectSpec = EffectSpec {
+        sizing: 1,
+        of_a_command: true,
         alike: &[EffectId::SteeringDelay, EffectId::TireRelaxation, EffectId::SteeringBacklash],
         starts: &[0.5, 0.15],
         ..spec(
@@ -21,6 +23,7 @@ impl Effect for SteeringLag {
             "q tau^2 d'' + tau d' + d = u",
             "a servo: damping 1/(2 sqrt q), from heavily damped (0.05: as good as first order) to 0.7 (0.5)",
             "steering up to 3 Hz",
+            &[Site::Steering],
             &[
                 positive("tau_s", "s", [0.06, 0.06]),
                 ParameterSpec { name: "q", unit: "1", null: 0.25, size: [0.1, 0.1], range: [-2.0, 2.5] },
@@ -85,154 +88,15 @@ impl<T: Real> Decay<T> {
     }
 }
 
-/// The wheels follow the command late.
-#[derive(Debug)]
-pub(super) struct SteeringDelay;
-
-impl Effect for SteeringDelay {
-    const SPEC: EffectSpec = EffectSpec {
-        alike: &[EffectId::SteeringLag, EffectId::TireRelaxation],
-        starts: &[0.5, 1.5],
-        ..spec(
-            "steering_delay",
-            "d(t) = u(t - T)",
-            "transport time of command and servo",
-            "steering up to 3 Hz",
-            &[positive("delay_s", "s", [0.05, 0.05])],
-        )
-    };
-
-    fn steer<T: Real>(p: &[T], steering_rad: &mut [T], dt_s: f64) {
-        let late = delayed(steering_rad, p[0], dt_s);
-        steering_rad.copy_from_slice(&late);
-    }
-}
-
-/// The wheels turn more than the recording says.
-#[derive(Debug)]
-pub(super) struct SteeringGain;
-
-impl Effect for SteeringGain {
-    const SPEC: EffectSpec = spec(
-        "steering_gain",
-        "d = (1 + g) u",
-        "steering ratio, servo scale",
-        "low lateral acceleration over a range of speeds",
-        &[both_sides("gain", "1", [0.05, 0.05])],
-    );
-
-    fn steer<T: Real>(p: &[T], steering_rad: &mut [T], _dt_s: f64) {
-        for u in steering_rad {
-            *u *= p[0] + 1.0;
-        }
-    }
-}
-
-/// The wheels are not straight when the recording says so.
-#[derive(Debug)]
-pub(super) struct SteeringOffset;
-
-impl Effect for SteeringOffset {
-    const SPEC: EffectSpec = spec(
-        "steering_offset",
-        "d = u + d0",
-        "steering centre, alignment",
-        "straights, both turn directions",
-        &[both_sides("offset_rad", "rad", [0.01, 0.005])],
-    );
-
-    fn steer<T: Real>(p: &[T], steering_rad: &mut [T], _dt_s: f64) {
-        for u in steering_rad {
-            *u += p[0];
-        }
-    }
-}
-
-/// Play in the steering.
-#[derive(Debug)]
-pub(super) struct SteeringBacklash;
-
-impl Effect for SteeringBacklash {
-    const SPEC: EffectSpec = EffectSpec {
-        alike: &[EffectId::SteeringLag],
-        starts: &[0.6, 1.8],
-        ..spec(
-            "steering_backlash",
-            "d stays while abs(u - d) is below the half width, then is dragged along",
-            "play operator",
-            "small reversals",
-            &[positive("half_width_rad", "rad", [0.008, 0.003])],
-        )
-    };
-
-    fn steer<T: Real>(p: &[T], steering_rad: &mut [T], _dt_s: f64) {
-        let Some(&first) = steering_rad.first() else { return };
-        let mut wheel = first;
-        for u in steering_rad.iter_mut() {
-            let (low, high) = (*u - p[0], *u + p[0]);
-            if wheel.re() < low.re() {
-                wheel = low;
-            } else if wheel.re() > high.re() {
-                wheel = high;
-            }
-            *u = wheel;
-        }
-    }
-}
-
-/// The limit of an inverse rate: infinite, in files `null`, where there is none.
-fn rate_radps(s_per_rad: f64) -> f64 {
-    if s_per_rad > 1e-6 { 1.0 / s_per_rad } else { f64::INFINITY }
-}
-
-/// The steering is not faster than a rate. Fitted as its inverse, so that "no limit" is 0.
-#[derive(Debug)]
-pub(super) struct SteeringRateLimit;
-
-impl Effect for SteeringRateLimit {
-    const SPEC: EffectSpec = EffectSpec {
-        reported: &[Reported { name: "rate_radps", unit: "rad/s", value: |p| rate_radps(p[0]) }],
-        starts: &[1.0, 2.0, 3.5],
-        flat_at_null: true,
-        ..spec(
-            "steering_rate_limit",
-            "abs(d') <= rate",
-            "slew rate of the servo or the power steering",
-            "fast steering",
-            &[ParameterSpec {
-                name: "s_per_rad",
-                unit: "s/rad",
-                null: 0.0,
-                size: [0.4, 2.0],
-                range: [0.0, 6.0],
-            }],
-        )
-    };
-
-    fn steer<T: Real>(p: &[T], steering_rad: &mut [T], dt_s: f64) {
-        let Some(&first) = steering_rad.first() else { return };
-        if p[0].re() < 1e-9 {
-            return;
-        }
-        let most = p[0].recip() * dt_s;
-        let mut wheel = first;
-        for u in steering_rad.iter_mut() {
-            let way = *u - wheel;
-            wheel = if way.re() > most.re() {
-                wheel + most
-            } else if way.re() < -most.re() {
-                wheel - most
-            } else {
-                *u
-            };
-            *u = wheel;
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::testing::assert_absent_at_null;
     use super::*;
+
+    #[test]
+    fn without_a_time_constant_the_wheels_are_there_at_once() {
+        assert_absent_at_null::<SteeringLag>();
+    }
 
     #[test]
     fn the_lag_is_the_second_order_equation_at_any_damping() {

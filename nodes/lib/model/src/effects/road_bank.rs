@@ -1,26 +1,16 @@
-//! Effects of the road's shape. The angle is its mean and the first harmonic of the distance over the lap, or over the way driven where none
-//! was closed; without a pose, of the heading, as on a tilted plane.
+//! The road leans to one side.
 
 use gripsight_vehicle::{GRAVITY_MPS2, Real};
 
-use super::loads::COMMAND;
+use super::common::angle;
 use super::{Effect, EffectId, EffectSpec, Reported, both_sides, spec};
+use crate::site::Site;
 use crate::terms::{Axles, Car, Moment, Motion};
-
-/// The angle at a place.
-fn angle<T: Real>(p: &[T], at: &Moment<T>) -> T {
-    p[0] + p[1] * at.place_rad.cos() + p[2] * at.place_rad.sin()
-}
 
 /// The largest angle of the lap, with its sign.
 fn extreme(p: &[f64]) -> f64 {
     let wave = p[1].hypot(p[2]);
     if p[0] < 0.0 { p[0] - wave } else { p[0] + wave }
-}
-
-/// The steepest climb. A lap that ends where it began climbs as much as it falls: of the two the climb is stated.
-fn climb(p: &[f64]) -> f64 {
-    p[0] + p[1].hypot(p[2])
 }
 
 /// The road leans to one side.
@@ -29,6 +19,7 @@ pub(super) struct RoadBank;
 
 impl Effect for RoadBank {
     const SPEC: EffectSpec = EffectSpec {
+        of_a_place: true,
         alike: &[EffectId::ImuTilt],
         reported: &[Reported { name: "angle_rad", unit: "rad", value: extreme }],
         ..spec(
@@ -36,6 +27,7 @@ impl Effect for RoadBank {
             "v_y' -= g sin(angle); F_z from g cos(angle) - v r sin(angle); positive: left side high",
             "gravity across the road",
             "an accelerometer beside v_y' + v r",
+            &[Site::RoadAndWind],
             &[
                 both_sides("mean_rad", "rad", [0.04, 0.04]),
                 both_sides("cosine_rad", "rad", [0.04, 0.04]),
@@ -57,28 +49,27 @@ impl Effect for RoadBank {
     }
 }
 
-/// The road climbs.
-#[derive(Debug)]
-pub(super) struct RoadSlope;
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{assert_absent_at_null, car, moment};
+    use super::*;
 
-impl Effect for RoadSlope {
-    const SPEC: EffectSpec = EffectSpec {
-        needs: COMMAND,
-        reported: &[Reported { name: "angle_rad", unit: "rad", value: climb }],
-        ..spec(
-            "road_slope",
-            "v_x' -= g sin(angle); positive: uphill",
-            "gravity along the road",
-            "any drive",
-            &[
-                both_sides("mean_rad", "rad", [0.03, 0.03]),
-                both_sides("cosine_rad", "rad", [0.03, 0.03]),
-                both_sides("sine_rad", "rad", [0.03, 0.03]),
-            ],
-        )
-    };
+    #[test]
+    fn it_pulls_down_the_bank_and_changes_the_loads() {
+        assert_absent_at_null::<RoadBank>();
+        let at = moment();
+        let mut motion = Motion::none();
+        RoadBank::motion(&[0.05, 0.0, 0.0], &car(), &at, &mut motion);
+        assert_eq!(motion.gravity_y_mps2, -GRAVITY_MPS2 * 0.05_f64.sin());
+        let mut axles = car().axles_at_rest();
+        RoadBank::loads(&[0.05, 0.0, 0.0], &car(), &at, &mut axles);
+        let into_road = 0.05_f64.cos() - at.v_x_mps * at.yaw_rate_radps * 0.05_f64.sin() / GRAVITY_MPS2;
+        let rest_n = car().axles_at_rest().front.load_n;
+        approx::assert_relative_eq!(axles.front.load_n, rest_n * into_road, epsilon = 1e-9);
+    }
 
-    fn motion<T: Real>(p: &[T], _car: &Car<T>, at: &Moment<T>, motion: &mut Motion<T>) {
-        motion.gravity_x_mps2 -= angle(p, at).sin() * GRAVITY_MPS2;
+    #[test]
+    fn the_largest_angle_is_stated_with_its_sign() {
+        assert!((RoadBank::SPEC.reported[0].value)(&[-0.03, 0.02, 0.0]) < -0.04);
     }
 }

@@ -1,9 +1,10 @@
-//! Effects along the car. They show only where the longitudinal command is recorded.
+//! Drag of the air.
 
-use gripsight_vehicle::{GRAVITY_MPS2, Real};
+use gripsight_vehicle::Real;
 
-use super::loads::COMMAND;
+use super::common::COMMAND;
 use super::{Effect, EffectId, EffectSpec, ParameterSpec, spec};
+use crate::site::Site;
 use crate::terms::{Car, Moment, Motion};
 
 /// Drag of the air.
@@ -12,6 +13,8 @@ pub(super) struct AeroDrag;
 
 impl Effect for AeroDrag {
     const SPEC: EffectSpec = EffectSpec {
+        along: true,
+        company: Some(EffectId::RollingResistance),
         alike: &[EffectId::RollingResistance],
         needs: COMMAND,
         ..spec(
@@ -19,6 +22,7 @@ impl Effect for AeroDrag {
             "F_x -= c m v^2 (m nominal)",
             "drag of a bluff body",
             "top speed",
+            &[Site::DriveTrain],
             &[ParameterSpec { name: "c_1pm", unit: "1/m", null: 0.0, size: [8e-3, 8e-4], range: [0.0, 5.0] }],
         )
     };
@@ -32,24 +36,19 @@ impl Effect for AeroDrag {
     }
 }
 
-/// Resistance of the rolling tires.
-#[derive(Debug)]
-pub(super) struct RollingResistance;
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{assert_absent_at_null, car, moment};
+    use super::*;
 
-impl Effect for RollingResistance {
-    const SPEC: EffectSpec = EffectSpec {
-        alike: &[EffectId::AeroDrag],
-        needs: COMMAND,
-        ..spec(
-            "rolling_resistance",
-            "F_x -= c m g",
-            "hysteresis of the rolling tire",
-            "any drive",
-            &[ParameterSpec { name: "c", unit: "1", null: 0.0, size: [0.03, 0.015], range: [0.0, 5.0] }],
-        )
-    };
-
-    fn motion<T: Real>(p: &[T], _car: &Car<T>, _at: &Moment<T>, motion: &mut Motion<T>) {
-        motion.force_x_mps2 -= p[0] * GRAVITY_MPS2;
+    #[test]
+    fn it_slows_with_the_square_of_the_speed() {
+        assert_absent_at_null::<AeroDrag>();
+        let (mut car, at) = (car(), moment());
+        let mut motion = Motion::none();
+        AeroDrag::car(&[8e-3], &mut car);
+        AeroDrag::motion(&[8e-3], &car, &at, &mut motion);
+        assert_eq!(car.drag_1pm, 8e-3);
+        approx::assert_relative_eq!(motion.force_x_mps2, -8e-3 * at.v_x_mps * at.v_x_mps, epsilon = 1e-12);
     }
 }

@@ -1,0 +1,206 @@
+//! What is known of an effect beside its equation in code.
+
+use gripsight_vehicle::VehicleParameters;
+
+use super::EffectId;
+use crate::site::Site;
+
+/// What must be recorded for an effect to show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Need {
+    /// A longitudinal command (drive acceleration or wheel torque).
+    LongitudinalCommand,
+    /// An inertial unit's accelerations.
+    Accelerometer,
+    /// A pose with at least one and a half laps, or with a second drive over the same course.
+    Passes,
+    /// Tires known from elsewhere (a file or a reference drive) and trusted.
+    ReferenceTires,
+}
+
+impl Need {
+    /// What to do about it.
+    #[must_use]
+    pub fn remedy(self) -> &'static str {
+        match self {
+            Self::LongitudinalCommand => "record the commanded acceleration along with the steering",
+            Self::Accelerometer => "record an inertial unit's accelerations",
+            Self::Passes => "record a pose and drive two laps or more, or hold out a second drive",
+            Self::ReferenceTires => {
+                "give the tires of an earlier drive (--pacejka), or that drive as the first bag"
+            }
+        }
+    }
+
+    /// In words, as a reason why an effect is invisible.
+    #[must_use]
+    pub fn reason(self) -> &'static str {
+        match self {
+            Self::LongitudinalCommand => "no longitudinal command is recorded",
+            Self::Accelerometer => "no accelerometer is recorded",
+            Self::Passes => {
+                "no pose over at least one and a half laps is recorded, and no second drive is held out"
+            }
+            Self::ReferenceTires => {
+                "with the tires free it is the same as other tires: give --pacejka or a reference bag"
+            }
+        }
+    }
+}
+
+/// A parameter of an effect as the fit sees it.
+#[derive(Debug, Clone, Copy)]
+pub struct ParameterSpec {
+    /// Name with unit, as reported.
+    pub name: &'static str,
+    /// Unit in the report; `1` for none.
+    pub unit: &'static str,
+    /// The value at which the effect is absent.
+    pub null: f64,
+    /// A size that matters on a 1:10 car and on a full-size car.
+    pub size: [f64; 2],
+    /// Bounds as multiples of the size around the null value.
+    pub range: [f64; 2],
+}
+
+/// A number that the report states for an effect, computed from its fitted parameters.
+#[derive(Debug, Clone, Copy)]
+pub struct Reported {
+    /// Name with unit.
+    pub name: &'static str,
+    /// Unit; `1` for none.
+    pub unit: &'static str,
+    /// From the fitted parameters.
+    pub value: fn(&[f64]) -> f64,
+}
+
+/// How much of its first parameter a car may well have without anything being the matter: from the car, and from a size that matters.
+pub type Usual = fn(&VehicleParameters, f64) -> f64;
+
+/// What follows with a lag in the motion for an effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lagging {
+    /// Slip angles that follow the steady ones with a lag.
+    Slip,
+    /// The lateral acceleration behind the roll of the body.
+    Roll,
+}
+
+/// What no fit of the model can know of an effect's size, as a standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unknown {
+    /// As a share of the size.
+    pub share: f64,
+    /// In samples, times the way driven in each.
+    pub samples: f64,
+}
+
+impl Unknown {
+    /// The standard deviation of a size, in its unit, on a recording with steps of `dt_s`.
+    #[must_use]
+    pub fn sigma(&self, size: f64, dt_s: f64, typical_speed_mps: f64) -> f64 {
+        self.share * size + self.samples * dt_s * typical_speed_mps
+    }
+}
+
+/// Everything about an effect but its equation in code.
+#[derive(Debug, Clone, Copy)]
+pub struct EffectSpec {
+    /// Canonical name.
+    pub name: &'static str,
+    /// The equation in one line.
+    pub equation: &'static str,
+    /// Where it comes from.
+    pub source: &'static str,
+    /// What must be driven to see it.
+    pub excitation: &'static str,
+    /// Where it sits: both axles where one parameter acts on both.
+    pub sites: &'static [Site],
+    /// What must be recorded to see it.
+    pub needs: &'static [Need],
+    /// What the fit moves.
+    pub parameters: &'static [ParameterSpec],
+    /// How many of the parameters, the first ones, size it; later ones place or shape it.
+    pub sizing: usize,
+    /// What the report states, where it is not the fit's parameters themselves.
+    pub reported: &'static [Reported],
+    /// Starts of the refit, in multiples of the size; one number applies to all parameters.
+    pub starts: &'static [f64],
+    /// Whether its derivative vanishes at the null value, so that screening must look at its first start instead.
+    pub flat_at_null: bool,
+    /// Effects that do nearly the same to the signals: only a fit of both tells which it is. Where such a one is not among the candidates
+    /// (left out, or invisible), it shares the name.
+    pub alike: &'static [EffectId],
+    /// How much of it every car may have; nothing of an effect that a sound car has nothing of.
+    pub usual: Option<Usual>,
+    /// Whether it sits in one part of the lap.
+    pub of_a_place: bool,
+    /// Whether it pushes along the car: the command and the longitudinal acceleration show it, and the tires' lateral forces hardly mind.
+    pub along: bool,
+    /// Whether the recorded steering is a command where this is at work, held until the next; a measured angle is neither.
+    pub of_a_command: bool,
+    /// What follows with a lag in the motion for it.
+    pub lagging: &'static [Lagging],
+    /// An effect that is there as well wherever this one is, and takes a part of its size.
+    pub company: Option<EffectId>,
+    /// The effect whose name both get where both are found.
+    pub goes_by: Option<EffectId>,
+    /// What no fit can know of its size.
+    pub unknown: Unknown,
+}
+
+/// A parameter with its null at 0 and bounds on both sides.
+pub(super) const fn both_sides(name: &'static str, unit: &'static str, size: [f64; 2]) -> ParameterSpec {
+    ParameterSpec { name, unit, null: 0.0, size, range: [-5.0, 5.0] }
+}
+
+/// A parameter that cannot be negative, null at 0.
+pub(super) const fn positive(name: &'static str, unit: &'static str, size: [f64; 2]) -> ParameterSpec {
+    ParameterSpec { name, unit, null: 0.0, size, range: [0.0, 5.0] }
+}
+
+/// A spec with the usual choices; the rest is filled in by the effect.
+pub(super) const fn spec(
+    name: &'static str,
+    equation: &'static str,
+    source: &'static str,
+    excitation: &'static str,
+    sites: &'static [Site],
+    parameters: &'static [ParameterSpec],
+) -> EffectSpec {
+    EffectSpec {
+        name,
+        equation,
+        source,
+        excitation,
+        sites,
+        needs: &[],
+        parameters,
+        sizing: parameters.len(),
+        reported: &[],
+        starts: &[0.0],
+        flat_at_null: false,
+        alike: &[],
+        usual: None,
+        of_a_place: false,
+        along: false,
+        of_a_command: false,
+        lagging: &[],
+        company: None,
+        goes_by: None,
+        unknown: Unknown { share: 0.0, samples: 0.0 },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_known_grows_with_the_size_or_with_the_way_of_a_sample() {
+        let of = |share, samples| Unknown { share, samples }.sigma(0.3, 0.01, 20.0);
+        assert_eq!(of(0.0, 0.0), 0.0);
+        approx::assert_relative_eq!(of(0.5, 0.0), 0.15, epsilon = 1e-12);
+        approx::assert_relative_eq!(of(0.0, 0.1), 0.02, epsilon = 1e-12);
+    }
+}
