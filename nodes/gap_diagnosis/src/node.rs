@@ -137,7 +137,10 @@ impl Diagnoser<'_> {
         while sequences.changed().await.is_ok() {
             let Some(sequence) = sequences.borrow_and_update().clone() else { continue };
             let start = Instant::now();
-            let result = self.diagnose(Arc::clone(&sequence), *tires.borrow()).await;
+            // A statement of its own: within the call the guard would be held across the await, and the next set to arrive would block
+            // the node's only thread for good.
+            let in_use = *tires.borrow();
+            let result = self.diagnose(Arc::clone(&sequence), in_use).await;
             let mut last = match result {
                 Ok(diagnosis) => self.publish(&diagnosis, &sequence).await,
                 Err(reason) => Last::Failed { reason },
