@@ -68,6 +68,11 @@ pub struct TopicMap {
     pub wheels: Option<String>,
     /// Recorded `StateSequence`s.
     pub sequence: Option<String>,
+    /// Raw pictures, for the launchers; the command line finds them by their type.
+    pub image: Option<String>,
+    /// Compressed pictures, likewise.
+    #[serde(rename = "image/compressed")]
+    pub image_compressed: Option<String>,
 }
 
 impl TopicMap {

@@ -261,3 +261,15 @@ fn what_cannot_be_written() {
     writer.write("/a", 1, &Clock::default()).unwrap();
     assert!(matches!(writer.write("/a", 2, &encode::drive(&drive(0))), Err(BagError::Write { .. })));
 }
+
+/// `--topics` takes what the launchers take.
+#[test]
+fn every_stack_s_file_is_a_topics_file() {
+    let stacks = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../params/stacks");
+    let files: Vec<_> = std::fs::read_dir(stacks).unwrap().map(|file| file.unwrap().path()).collect();
+    assert!(files.len() >= 4);
+    for file in files {
+        let topics = TopicMap::read(&file).unwrap();
+        assert!(topics.odom.is_some() && topics.drive.is_some(), "{}", file.display());
+    }
+}
