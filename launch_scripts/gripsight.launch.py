@@ -72,6 +72,7 @@ def nodes(context):
         node(
             "identifier",
             [
+                *remaps("odom", "drive"),
                 ("sequence", "telemetry/sequence"),
                 ("model", "s4_residual/model"),
                 ("friction", "camera_prior/friction"),

@@ -94,7 +94,7 @@ mapfile -t eyes < <(remaps odom image image/compressed)
 
 start telemetry "${car[@]}" "${replay[@]}"
 start s4_residual "${motion[@]}" -r sequence:=telemetry/sequence -r candidate:=identifier/candidate "${replay[@]}"
-start identifier -r sequence:=telemetry/sequence -r model:=s4_residual/model -r friction:=camera_prior/friction "${replay[@]}"
+start identifier "${motion[@]}" -r sequence:=telemetry/sequence -r model:=s4_residual/model -r friction:=camera_prior/friction "${replay[@]}"
 if $camera; then
     defaults=(--params-file "$root/params/camera_prior.yaml")
     start camera_prior "${eyes[@]}" "${replay[@]}"

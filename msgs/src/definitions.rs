@@ -18,6 +18,7 @@ const DEFINITIONS: &[(&str, &str)] = definitions! {
         "GapParameter"
         "GapRegion"
         "GapReport"
+        "Grip"
         "Handshake"
         "IdentificationProgress"
         "Interval"

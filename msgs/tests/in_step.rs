@@ -9,7 +9,7 @@ use gripsight_msgs::standard::{
     ackermann_msgs, builtin_interfaces, diagnostic_msgs, nav_msgs, rcl_interfaces, rosgraph_msgs, sensor_msgs,
 };
 use gripsight_msgs::{
-    Excitation, FrictionPrior, GapReport, IdentificationProgress, Message, PacejkaParams, Residual,
+    Excitation, FrictionPrior, GapReport, Grip, IdentificationProgress, Message, PacejkaParams, Residual,
     ResidualModel, StateSequence, definition, schema, type_names,
 };
 use serde_reflection::{ContainerFormat, Format, Named, Registry, Tracer, TracerConfig};
@@ -24,6 +24,7 @@ fn registry() -> Registry {
         Excitation,
         FrictionPrior,
         GapReport,
+        Grip,
         IdentificationProgress,
         PacejkaParams,
         Residual,

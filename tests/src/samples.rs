@@ -36,6 +36,10 @@ pub fn pacejka(seed: u64) -> PacejkaParams {
         rear_peak: PeakFriction { friction: peaks[1], reached: false, from_prior: true },
         front_slip_rad: slip[0],
         rear_slip_rad: slip[1],
+        front_valid_slip_rad: next(),
+        rear_valid_slip_rad: next(),
+        front_valid_force_n: next(),
+        rear_valid_force_n: next(),
         signals: SignalCorrections {
             steering_delay_s: next(),
             steering_gain: next(),

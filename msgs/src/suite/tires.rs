@@ -59,16 +59,16 @@ impl Message for SignalCorrections {
     const TYPE: &'static str = "gripsight_msgs/msg/SignalCorrections";
 }
 
-/// A tire parameter set, Phi_p. The MPC's topic carries ACCEPTED sets only.
+/// A tire parameter set, Phi_p. The MPC's topic carries ACCEPTED and ACCEPTED_WITHIN sets (PROVISIONAL ones where a parameter says so), and WITHDRAWN.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PacejkaParams {
     /// Stamp of the last sample of the sequence.
     pub header: Header,
     /// Run, sequence and iteration of the set.
     pub handshake: Handshake,
-    /// PROPOSED, ACCEPTED or REJECTED.
+    /// One of the constants.
     pub status: u8,
-    /// Why REJECTED, or what ACCEPTED must be read with.
+    /// Why REJECTED or WITHDRAWN, or what the set must be read with.
     pub reason: String,
     /// Front axle.
     pub front: MagicFormula,
@@ -90,6 +90,14 @@ pub struct PacejkaParams {
     pub front_slip_rad: Range,
     /// Rear slip angles visited (rad).
     pub rear_slip_rad: Range,
+    /// The set is valid up to this front slip angle (rad); NaN: not stated.
+    pub front_valid_slip_rad: f64,
+    /// And up to this rear slip angle (rad).
+    pub rear_valid_slip_rad: f64,
+    /// Largest front force that it promises, at the static load (N).
+    pub front_valid_force_n: f64,
+    /// Largest rear force that it promises (N).
+    pub rear_valid_force_n: f64,
     /// What was corrected before the fit.
     pub signals: SignalCorrections,
     /// Mean forward speed of the sequence (m/s).
@@ -99,12 +107,39 @@ pub struct PacejkaParams {
 impl PacejkaParams {
     /// A candidate of the running iteration.
     pub const PROPOSED: u8 = 1;
-    /// The result of a run: use it.
+    /// The result of a run: use it, the peak is known.
     pub const ACCEPTED: u8 = 2;
     /// The result of a run that must not be used; reason says why.
     pub const REJECTED: u8 = 3;
+    /// The result of a run: use it, it promises no force beyond what was shown; see the limits.
+    pub const ACCEPTED_WITHIN: u8 = 4;
+    /// The peak rests on a friction prior.
+    pub const PROVISIONAL: u8 = 5;
+    /// Grip has fallen below what this set promises: do not go on with it.
+    pub const WITHDRAWN: u8 = 6;
 }
 
 impl Message for PacejkaParams {
     const TYPE: &'static str = "gripsight_msgs/msg/PacejkaParams";
+}
+
+/// Whether the car still grips as the set in use promises: published as it is watched, at once where it does not.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Grip {
+    /// Stamp of the last sample looked at.
+    pub header: Header,
+    /// Run and sequence of the set in use.
+    pub handshake: Handshake,
+    /// True where grip has fallen below what the set promises.
+    pub fallen: bool,
+    /// Share of the promised lateral force that the car gave over the last moments; NaN while too little of it is asked for.
+    pub share: f64,
+    /// Lateral acceleration that the set promises at the slips driven (m/s^2).
+    pub promised_mps2: f64,
+    /// The same in words.
+    pub text: String,
+}
+
+impl Message for Grip {
+    const TYPE: &'static str = "gripsight_msgs/msg/Grip";
 }

@@ -4,6 +4,7 @@ mod diagnostics;
 mod node;
 mod outputs;
 mod run;
+mod watch;
 
 fn main() -> anyhow::Result<()> {
     gripsight_runtime::run("identifier", include_str!("../README.md"), node::setup)

@@ -5,21 +5,24 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use gripsight_bag::Reassembler;
+use gripsight_bag::{Reassembler, decode};
 use gripsight_identification::export::{Provenance, TireFiles};
-use gripsight_identification::{AcceptedSet, Config, FrictionPrior, Method, Outcome};
+use gripsight_identification::{Config, FrictionPrior, Method, Outcome, Status};
 use gripsight_identification_messages as messages;
+use gripsight_msgs::standard::ackermann_msgs::AckermannDriveStamped;
+use gripsight_msgs::standard::nav_msgs::Odometry;
 use gripsight_msgs::{
-    FrictionPrior as FrictionMessage, ResidualModel as ModelMessage, StateSequence as SequenceMessage,
+    FrictionPrior as FrictionMessage, PacejkaParams, ResidualModel as ModelMessage, StateSequence as SequenceMessage,
 };
 use gripsight_runtime::{Descriptor, Diagnostics, Node, Parameter, Qos, Subscription, vehicle_parameters};
-use gripsight_signals::StateSequence;
+use gripsight_signals::{Measurement, StateSequence};
 use gripsight_vehicle::VehicleParameters;
 use tokio::sync::watch;
 
 use crate::diagnostics::{Facts, LastRun, status};
 use crate::outputs::Outputs;
 use crate::run::{Run, RunError};
+use crate::watch::{InForce, Watch, withdraw};
 
 /// Declares parameters and topics; gives the node's work.
 pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyhow::Result<()>> + use<>> {
@@ -28,6 +31,9 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
     let sequences = node.subscription::<SequenceMessage>("sequence", Qos::latched().with_depth(64))?;
     let frictions = node.subscription::<FrictionMessage>("friction", Qos::latched())?;
     let models = node.subscription::<ModelMessage>("model", Qos::latched())?;
+    let sensor = node.sensor_qos(50);
+    let odometry = node.subscription::<Odometry>("odom", sensor)?;
+    let drive = node.subscription::<AckermannDriveStamped>("drive", sensor)?;
     let outputs = Outputs::new(node)?;
     let diagnostics = node.diagnostics();
 
@@ -42,13 +48,15 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
             in_force: None,
             grip: None,
         });
+        let in_force = RefCell::new(None);
         let (newest, sequence) = watch::channel(None);
         let (prior, prior_in_force) = watch::channel(None);
         tokio::select! {
             () = collect_sequences(sequences, newest) => {}
             () = collect_friction(frictions, prior, &facts) => {}
             () = report(&diagnostics, &facts) => {}
-            () = identify_each(sequence, prior_in_force, models, &outputs, &vehicle, &settings, &facts) => {}
+            () = follow_grip(odometry, drive, &vehicle, &in_force, &outputs) => {}
+            () = identify_each(sequence, prior_in_force, models, &outputs, &vehicle, &settings, &in_force, &facts) => {}
         }
         Ok(())
     })
@@ -60,6 +68,7 @@ struct Settings {
     max_iterations: Parameter<i64>,
     tolerance: Parameter<f64>,
     model_timeout_s: Parameter<f64>,
+    publish_provisional: Parameter<bool>,
     output_folder: Parameter<String>,
     floor: Parameter<String>,
 }
@@ -95,6 +104,11 @@ impl Settings {
                 "model_timeout_s",
                 30.0,
                 Descriptor::new("How long a residual model is waited for [s]").range(1.0..=3600.0),
+            )?,
+            publish_provisional: node.parameter(
+                "publish_provisional",
+                false,
+                Descriptor::new("Whether ~/pacejka carries sets whose peak rests on a friction prior, too"),
             )?,
             output_folder: node.parameter(
                 "output_folder",
@@ -161,7 +175,27 @@ async fn report(diagnostics: &Diagnostics, facts: &RefCell<Facts>) {
     }
 }
 
+/// Watches the set in force on what the car reports.
+async fn follow_grip(
+    mut odometry: Subscription<Odometry>,
+    mut drive: Subscription<AckermannDriveStamped>,
+    vehicle: &VehicleParameters,
+    in_force: &RefCell<Option<InForce>>,
+    outputs: &Outputs,
+) {
+    let mut watch = Watch::new();
+    loop {
+        let measurement = tokio::select! {
+            Some(message) = odometry.next() => Measurement::Odometry(decode::odometry(&message)),
+            Some(message) = drive.next() => Measurement::Drive(decode::drive(&message)),
+            else => return,
+        };
+        watch.take(measurement, vehicle, in_force, outputs).await;
+    }
+}
+
 /// One run after the other, each on the newest sequence, each starting from the set accepted last.
+#[expect(clippy::too_many_arguments, reason = "the node's whole state, each part with another task beside")]
 async fn identify_each(
     mut sequences: watch::Receiver<Option<Arc<StateSequence>>>,
     prior: watch::Receiver<Option<FrictionPrior>>,
@@ -169,18 +203,19 @@ async fn identify_each(
     outputs: &Outputs,
     vehicle: &Arc<VehicleParameters>,
     settings: &Settings,
+    in_force: &RefCell<Option<InForce>>,
     facts: &RefCell<Facts>,
 ) {
     outputs.waiting().await;
-    let mut accepted: Option<AcceptedSet> = None;
     while sequences.changed().await.is_ok() {
         let Some(sequence) = sequences.borrow_and_update().clone() else { continue };
         let start = Instant::now();
+        let previous = in_force.borrow().as_ref().map(|in_force| in_force.set.clone());
         let run = Run {
             sequence: Arc::clone(&sequence),
             vehicle: Arc::clone(vehicle),
             prior: *prior.borrow(),
-            previous: accepted.clone(),
+            previous: previous.clone(),
             config: settings.config(),
             model_timeout: Duration::from_secs_f64(settings.model_timeout_s.get()),
             start,
@@ -190,27 +225,56 @@ async fn identify_each(
         };
         let result = run.finish().await;
         if let Ok(outcome) = &result {
-            outputs.conclude(outcome, &sequence).await;
+            let message = outputs.conclude(outcome, &sequence).await;
             log(outcome);
             let notice =
-                outcome.grip.as_ref().zip(accepted.as_ref()).and_then(|(grip, set)| grip.notice(set));
+                outcome.grip.as_ref().zip(previous.as_ref()).and_then(|(grip, set)| grip.notice(set));
             if let Some(notice) = &notice {
                 tracing::warn!("sequence {}: {notice}", sequence.sequence_id);
             }
+            hand_on(outcome, message, notice.clone(), settings.publish_provisional.get(), in_force, outputs).await;
             facts.borrow_mut().grip = notice;
-            accepted = outcome.accepted_set().or(accepted);
             write_files(outcome, &sequence, settings);
         }
         let mut facts = facts.borrow_mut();
         facts.runs += 1;
         facts.running = None;
         facts.last_run_s = start.elapsed().as_secs_f64();
-        facts.in_force = accepted.as_ref().map(|set| set.sequence_id);
+        facts.in_force = in_force.borrow().as_ref().filter(|i| !i.withdrawn).map(|i| i.set.sequence_id);
         facts.last = last_run(&result);
         facts.accepted += usize::from(matches!(facts.last, LastRun::Accepted { .. }));
         if let Err(error) = &result {
             tracing::error!("sequence {}: {error}", sequence.sequence_id);
         }
+    }
+}
+
+/// Hands the end of a run on to the MPC: a set that knows more than the one in force takes its place; one that no longer fits is withdrawn.
+async fn hand_on(
+    outcome: &Outcome,
+    message: PacejkaParams,
+    notice: Option<String>,
+    provisional: bool,
+    in_force: &RefCell<Option<InForce>>,
+    outputs: &Outputs,
+) {
+    let replaces = outcome.replaces(in_force.borrow().as_ref().filter(|i| !i.withdrawn).map(|i| &i.set));
+    if let Some(set) = outcome.accepted_set().filter(|_| replaces) {
+        let sent = messages::provisional(outcome)
+            .filter(|_| provisional)
+            .map(|set| PacejkaParams { header: message.header.clone(), ..set })
+            .unwrap_or(message);
+        outputs.publish(&sent).await;
+        *in_force.borrow_mut() = Some(InForce { set, message: sent, withdrawn: false });
+        return;
+    }
+    if provisional && outcome.status == Status::Provisional {
+        outputs.publish(&message).await;
+    }
+    let falls = |i: &InForce| outcome.grip.as_ref().is_some_and(|grip| grip.fallen(&i.set));
+    let withdraws = in_force.borrow().as_ref().is_some_and(|i| !i.withdrawn && falls(i));
+    if let (true, Some(notice)) = (withdraws, notice) {
+        withdraw(in_force, notice, outputs).await;
     }
 }
 
@@ -227,7 +291,7 @@ fn log(outcome: &Outcome) {
     tracing::info!(
         "sequence {}: {} after {} iterations; cornering stiffness {:.1} / {:.1} N/rad, peak friction {:.3} / {:.3}{}{}",
         outcome.key.sequence_id,
-        if outcome.accepted { "accepted" } else { "rejected" },
+        outcome.status.name(),
         outcome.iterations,
         k.front.value,
         k.rear.value,
@@ -252,6 +316,8 @@ fn write_files(outcome: &Outcome, sequence: &StateSequence, settings: &Settings)
         vehicle_hash: outcome.key.vehicle_hash.clone(),
         seed: outcome.key.seed,
         command: "identifier".to_owned(),
+        status: outcome.status,
+        valid_within: outcome.valid_within,
         notes: outcome.reasons.clone(),
     };
     let files = TireFiles {
@@ -261,7 +327,7 @@ fn write_files(outcome: &Outcome, sequence: &StateSequence, settings: &Settings)
         floor: &settings.floor.get(),
         driven_mps: outcome.v_x_range_mps.high,
     };
-    match files.write(Path::new(&folder), outcome.accepted) {
+    match files.write(Path::new(&folder)) {
         Ok(_) => tracing::info!("files written to {folder}"),
         Err(error) => tracing::error!("files not written: {error}"),
     }

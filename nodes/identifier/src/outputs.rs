@@ -6,7 +6,7 @@ use gripsight_bag::encode;
 use gripsight_identification::{Candidate, Config, IterationRecord, Outcome, RunKey};
 use gripsight_identification_messages as messages;
 use gripsight_msgs::standard::std_msgs::Header;
-use gripsight_msgs::{IdentificationProgress as Progress, PacejkaParams};
+use gripsight_msgs::{Grip, IdentificationProgress as Progress, PacejkaParams};
 use gripsight_runtime::{Node, Publisher, Qos};
 use gripsight_signals::StateSequence;
 use gripsight_vehicle::VehicleParameters;
@@ -15,6 +15,7 @@ use gripsight_vehicle::VehicleParameters;
 pub(crate) struct Outputs {
     candidate: Publisher<PacejkaParams>,
     pacejka: Publisher<PacejkaParams>,
+    grip: Publisher<Grip>,
     progress: Publisher<Progress>,
 }
 
@@ -23,6 +24,7 @@ impl Outputs {
         Ok(Self {
             candidate: node.publisher("~/candidate", Qos::latched())?,
             pacejka: node.publisher("~/pacejka", Qos::latched())?,
+            grip: node.publisher("~/grip", Qos::latched())?,
             progress: node.publisher("~/progress", Qos::latched())?,
         })
     }
@@ -38,13 +40,21 @@ impl Outputs {
         self.candidate.publish(&message).await;
     }
 
-    /// Publishes the end of a run: an accepted set goes to the MPC, a rejected one does not.
-    pub(crate) async fn conclude(&self, outcome: &Outcome, sequence: &StateSequence) {
+    /// Publishes the end of a run, and gives its message.
+    pub(crate) async fn conclude(&self, outcome: &Outcome, sequence: &StateSequence) -> PacejkaParams {
         let message = PacejkaParams { header: header(sequence), ..messages::result(outcome) };
         self.candidate.publish(&message).await;
-        if outcome.accepted {
-            self.pacejka.publish(&message).await;
-        }
+        message
+    }
+
+    /// Publishes a set on the MPC's topic.
+    pub(crate) async fn publish(&self, message: &PacejkaParams) {
+        self.pacejka.publish(message).await;
+    }
+
+    /// Publishes how the set in force grips.
+    pub(crate) async fn grip(&self, message: &Grip) {
+        self.grip.publish(message).await;
     }
 
     /// Says that there has been no sequence yet.

@@ -65,8 +65,7 @@ impl Run<'_> {
             Started::Running(run) => self.turns(run).await?,
             Started::Refused(outcome) => *outcome,
         };
-        let text = if outcome.accepted { "accepted" } else { "rejected" };
-        self.step(&outcome.key, Progress::FINISHED, outcome.history.last(), text.to_owned()).await;
+        self.step(&outcome.key, Progress::FINISHED, outcome.history.last(), outcome.status.name().to_owned()).await;
         Ok(outcome)
     }
 

@@ -16,7 +16,7 @@ use gripsight_bag::{ReadReport, TopicMap, read_sequences};
 use gripsight_diagnosis::{ExtendedModelFile, without_effects};
 use gripsight_identification::export::{Provenance, TireFiles};
 use gripsight_identification::{
-    self as identification, Config, FrictionPrior, Method, ResidualKind, identify,
+    self as identification, Config, FrictionPrior, Method, ResidualKind, Status, ValidWithin, identify,
 };
 use gripsight_report::{Header, IdentificationInput, identification_page};
 use gripsight_signals::{StateSequence, WindowConfig};
@@ -33,8 +33,10 @@ use windows::Windows;
 /// Identify the tires of the car in a bag.
 ///
 /// DIR receives identification.json, report.html, timing.json and the files that other stacks read: pacejka.yaml (MPC),
-/// <car>_pacejka.txt and <car>_lookup_table.csv (steering-lookup controllers). Where the result is not accepted, those three
-/// are named *.rejected.* instead, what lies there already stays as it is, and the exit code is 3.
+/// <car>_pacejka.txt and <car>_lookup_table.csv (steering-lookup controllers). They promise no force beyond what the drive has
+/// shown, and say up to which slips and forces they are valid (status accepted, or accepted_within where the peak was not reached).
+/// Where the result is rejected, those three are named *.rejected.* instead, what lies there already stays as it is, and the
+/// exit code is 3. A friction prior never replaces what the data show: it adds a second set, *.provisional.*.
 ///
 /// A bag of odometry and drive commands is taken as one stretch. A bag of recorded state sequences is worked through in
 /// their order, as the nodes do live, each starting from the set accepted last; the files describe the last one. So is a bag
@@ -52,7 +54,7 @@ pub(crate) struct IdentifyArgs {
     /// The car, as a ROS 2 parameter file; without it, an F1TENTH-class 1:10 car.
     #[arg(long, value_name = "FILE")]
     vehicle: Option<PathBuf>,
-    /// What is believed of the peak friction: where D starts, and its soft bound if the peak is not reached.
+    /// What is believed of the peak friction: D's soft bound in a second, provisional set where the peak is not reached.
     #[arg(long, value_name = "MU", conflicts_with = "camera", value_parser = positive)]
     prior_mu: Option<f64>,
     /// Standard deviation of that belief.
@@ -213,7 +215,9 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
         let files = write(args, &vehicle, &notes, sequence, &result)?;
         timing.writing_s += writing.elapsed().as_secs_f64();
         windows.add(sequence, &result, previous.as_ref());
-        previous = result.accepted_set().or(previous);
+        if result.replaces(previous.as_ref()) {
+            previous = result.accepted_set().or(previous);
+        }
         last = Some((result, files));
     }
     timing.total_s = start.elapsed().as_secs_f64();
@@ -251,6 +255,8 @@ fn write(
         vehicle_hash: result.key.vehicle_hash.clone(),
         seed: args.seed,
         command: invocation(std::env::args()),
+        status: result.status,
+        valid_within: result.valid_within,
         notes: result.reasons.clone(),
     };
     let header = Header {
@@ -285,7 +291,17 @@ fn write(
         floor: &args.floor,
         driven_mps: result.v_x_range_mps.high,
     };
-    files.extend(tire_files.write(&args.out, result.accepted)?);
+    files.extend(tire_files.write(&args.out)?);
+    if let Some(set) = result.provisional.filter(|_| result.status != Status::Provisional) {
+        let provenance = Provenance {
+            status: Status::Provisional,
+            valid_within: ValidWithin::NOWHERE,
+            notes: vec!["D rests on a friction prior".to_owned()],
+            ..provenance.clone()
+        };
+        let provisional = TireFiles { tires: &set.phi_p, provenance: &provenance, ..tire_files };
+        files.extend(provisional.write(&args.out)?);
+    }
     Ok(files)
 }
 

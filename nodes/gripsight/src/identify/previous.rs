@@ -4,15 +4,19 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use gripsight_identification::{AcceptedSet, Nuisance, PerAxle, RunKey, SignalCorrections};
+use gripsight_identification::{
+    AcceptedSet, Nuisance, PerAxle, RunKey, SignalCorrections, Status, ValidWithin,
+};
 use gripsight_vehicle::PacejkaParameters;
 use serde::Deserialize;
 
 /// The part of identification.json that a later run needs.
 #[derive(Deserialize)]
 struct Earlier {
-    accepted: bool,
+    status: Status,
     phi_p: PacejkaParameters,
+    found: PacejkaParameters,
+    valid_within: ValidWithin,
     signals: SignalCorrections,
     nuisance: Nuisance,
     peak_friction: PerAxle<Peak>,
@@ -46,13 +50,16 @@ pub(super) fn read(path: &Path) -> anyhow::Result<AcceptedSet> {
     let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
     let earlier: Earlier = serde_json::from_str(&text)
         .with_context(|| format!("{} is not an identification.json", path.display()))?;
-    if !earlier.accepted {
+    if !earlier.status.accepted() {
         bail!("{}: that identification was not accepted", path.display());
     }
     Ok(AcceptedSet {
         vehicle_hash: earlier.key.vehicle_hash,
         sequence_id: earlier.key.sequence_id,
-        phi_p: earlier.phi_p,
+        phi_p: earlier.found,
+        promised: earlier.phi_p,
+        status: earlier.status,
+        valid_within: earlier.valid_within,
         corrections: earlier.signals,
         nuisance: Nuisance { combined_slip: 0.0, ..earlier.nuisance },
         rollout_rmse: [earlier.rmse.rollout.v_y_mps.after, earlier.rmse.rollout.yaw_rate_radps.after],

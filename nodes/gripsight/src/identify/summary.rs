@@ -4,19 +4,23 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use gripsight_identification::{Outcome, Range};
-use gripsight_report::text::{estimate, interval, peak_friction, significant, with_interval};
+use gripsight_report::text::{estimate, interval, peak_friction, significant, status, with_interval};
 
 use super::progress::Timing;
 
 /// The result in about 25 lines.
 pub(super) fn summary(car: &str, result: &Outcome, files: &[PathBuf], timing: &Timing) -> String {
     let mut text = String::new();
-    let verdict = if result.accepted { "accepted" } else { "not accepted" };
+    let verdict = status(result);
     let _ = writeln!(text, "{car}: {verdict}");
     for reason in &result.reasons {
         let _ = writeln!(text, "  - {reason}");
     }
     tires(&mut text, result);
+    if let Some(set) = &result.provisional {
+        let d = set.peak_friction.map(|p| peak_friction(&p));
+        let _ = writeln!(text, "{:<28}{:<32}{}", "peak friction, provisional", d.front, d.rear);
+    }
     signals(&mut text, result);
     let r = &result.rmse;
     let turns = if result.converged { "converged" } else { "not converged" };
@@ -67,6 +71,8 @@ pub(super) fn summary(car: &str, result: &Outcome, files: &[PathBuf], timing: &T
 }
 
 fn tires(text: &mut String, result: &Outcome) {
+    let valid =
+        |of: &dyn Fn(&gripsight_identification::ValidWithin) -> f64| significant(of(&result.valid_within), 3);
     let slip = |r: &Range| interval(r.low.to_degrees(), r.high.to_degrees());
     let letters =
         |t: &gripsight_vehicle::MagicFormula| [t.b, t.c, t.d, t.e].map(|v| significant(v, 3)).join("  ");
@@ -76,6 +82,8 @@ fn tires(text: &mut String, result: &Outcome) {
         ("peak friction", peak_friction(&d.front), peak_friction(&d.rear)),
         ("cornering stiffness N/rad", estimate(&k.front), estimate(&k.rear)),
         ("slip visited deg", slip(&s.front), slip(&s.rear)),
+        ("valid to slip deg", valid(&|v| v.slip_rad.front.to_degrees()), valid(&|v| v.slip_rad.rear.to_degrees())),
+        ("valid to force N", valid(&|v| v.force_n.front), valid(&|v| v.force_n.rear)),
         ("B  C  D  E", letters(&result.phi_p.front), letters(&result.phi_p.rear)),
     ];
     text.push('\n');

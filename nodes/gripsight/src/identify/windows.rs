@@ -32,9 +32,11 @@ impl Windows {
         let (k, d) = (&result.cornering_stiffness_n_per_rad, &result.peak_friction);
         let _ = write!(
             self.lines,
-            "{from_s:.3},{:.3},{},{:.1},{:.1},{:.4},{:.4},{},{},",
+            "{from_s:.3},{:.3},{},{:.4},{:.4},{:.1},{:.1},{:.4},{:.4},{},{},",
             from_s + sequence.duration_s(),
-            result.accepted,
+            result.status.name(),
+            result.phi_p.front.d,
+            result.phi_p.rear.d,
             k.front.value,
             k.rear.value,
             d.front.value,
@@ -59,7 +61,7 @@ impl Windows {
 
     /// Writes `windows.csv`.
     pub(super) fn write(&self, folder: &Path) -> anyhow::Result<PathBuf> {
-        const HEADER: &str = "from_s,to_s,accepted,k_front_n_per_rad,k_rear_n_per_rad,d_front,d_rear,reached_front,reached_rear,\
+        const HEADER: &str = "from_s,to_s,status,d_set_front,d_set_rear,k_front_n_per_rad,k_rear_n_per_rad,d_front,d_rear,reached_front,reached_rear,\
             error_ratio,d_front_now,d_rear_now,changed\n";
         let path = folder.join("windows.csv");
         std::fs::write(&path, HEADER.to_owned() + &self.lines)

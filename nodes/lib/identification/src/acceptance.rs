@@ -1,17 +1,18 @@
-//! Whether a set may be used, and why not: every reason with its figure.
+//! What a set may be used for, and why: every reason with its figure.
+//!
+//! What counts is the error in force over the slips driven and its harm to a controller. A curve that is known to a factor of [`KNOWN_WITHIN`] is handed
+//! on, with no force promised beyond what was shown of it; one that is known worse is not.
 
 use crate::conclude::unstable_at_mps;
-use crate::{Identification, Outcome, PeakFriction};
+use crate::envelope::Envelope;
+use crate::{Identification, Outcome, PeakFriction, Status, ValidWithin};
 
-/// A new set may predict held-out data this much worse than the previous one and still replace it: both are within noise.
-const NO_WORSE: f64 = 1.02;
+/// The upper over the lower end of a force, stiffness included, at any slip driven: a controller with the classical gain margin of 6 dB bears a
+/// plant whose gain is known to this factor.
+const KNOWN_WITHIN: f64 = 2.0;
 
-/// Largest scatter of v_y, as a share of the slip at which the rear tires' linear force would meet their peak, that tires can be fitted through.
+/// Scatter of v_y that is said, as a share of the slip at which the rear tires' linear force would meet their peak.
 const V_Y_SHARE: f64 = 0.25;
-
-/// A cornering stiffness whose 90 % interval reaches further than this share of its value on either side is not good enough to steer by. On
-/// development draws (seeds 5000-5499) all sets with a stiffness off by more than 25 % had wider ones.
-const STIFFNESS_KNOWN: f64 = 0.2;
 
 /// No steering that a driver can race with answers later than this.
 const LONGEST_DELAY_S: f64 = 0.2;
@@ -20,24 +21,39 @@ const LONGEST_DELAY_S: f64 = 0.2;
 #[derive(Default)]
 struct Verdict {
     against: Vec<String>,
+    /// The curve is not known well enough where the peak is missing: a friction prior may help.
+    unknown: Vec<String>,
     remarks: Vec<String>,
     drive: Vec<String>,
 }
 
-/// Fills in verdict, reasons and advice.
-pub(crate) fn judge(run: &Identification, outcome: &mut Outcome) {
+/// Fills in status, set, limits, reasons and advice.
+pub(crate) fn judge(run: &Identification, envelope: &Envelope, outcome: &mut Outcome) {
     let mut verdict = Verdict::default();
     changed_grip(run, outcome, &mut verdict);
-    let shape = bounds(outcome, &mut verdict);
-    lateral_velocity(outcome, &mut verdict);
+    bounds(outcome, &mut verdict);
     prediction(run, outcome, &mut verdict);
-    stability(run, outcome, &mut verdict);
-    stiffnesses(outcome, &mut verdict);
-    peaks(run, outcome, &shape, &mut verdict);
+    stability(run, envelope, outcome, &mut verdict);
+    lateral_velocity(outcome, &mut verdict);
+    forces(envelope, outcome, &mut verdict);
+    peaks(run, outcome, &mut verdict);
     convergence(outcome, &mut verdict);
     signals(run, outcome, &mut verdict);
-    outcome.accepted = verdict.against.is_empty();
-    outcome.reasons = verdict.against.into_iter().chain(verdict.remarks).collect();
+    let peaks = &outcome.peak_friction;
+    outcome.status = match (verdict.against.is_empty(), verdict.unknown.is_empty(), &outcome.provisional) {
+        (true, true, _) if peaks.front.reached && peaks.rear.reached => Status::Accepted,
+        (true, true, _) => Status::AcceptedWithin,
+        (true, false, Some(_)) => Status::Provisional,
+        _ => Status::Rejected,
+    };
+    outcome.accepted = outcome.status.accepted();
+    (outcome.phi_p, outcome.valid_within) = match (outcome.status, &outcome.provisional) {
+        (Status::Accepted | Status::AcceptedWithin, _) => (envelope.tires, envelope.valid_within),
+        (Status::Provisional, Some(set)) => (set.phi_p, ValidWithin::NOWHERE),
+        _ => (outcome.found, ValidWithin::NOWHERE),
+    };
+    outcome.reasons =
+        verdict.against.into_iter().chain(verdict.unknown).chain(verdict.remarks).collect();
     outcome.drive_next = verdict.drive;
 }
 
@@ -53,39 +69,32 @@ fn changed_grip(run: &Identification, outcome: &Outcome, verdict: &mut Verdict) 
     }
 }
 
-/// Parameters that are not finite or on a bound; returns the C and E among them.
-fn bounds(outcome: &Outcome, verdict: &mut Verdict) -> Vec<String> {
-    if !outcome.phi_p.is_finite() {
+/// Parameters that are not finite or on a bound. On a bound is what the drive does not hold: a peak that was not reached, or the shape. No more is promised
+/// than was shown, whatever it is; and a stiffness on its bound is not known.
+fn bounds(outcome: &Outcome, verdict: &mut Verdict) {
+    if !outcome.found.is_finite() {
         verdict.against.push("the tires are not finite".to_owned());
     }
-    // C and E share a flat ridge: one of them on its bound still is the curve that the data show. B and D are not.
-    let (shape, railed): (Vec<_>, Vec<_>) =
-        outcome.on_bound.iter().cloned().partition(|name| name.ends_with(".c") || name.ends_with(".e"));
-    if !railed.is_empty() {
-        verdict.against.push(format!("on a bound: {}", railed.join(", ")));
+    if !outcome.on_bound.is_empty() {
+        let names = outcome.on_bound.join(", ");
+        verdict.remarks.push(format!("on a bound, and hardly told by the data: {names}"));
     }
-    if !shape.is_empty() {
-        let names = shape.join(", ");
-        verdict.remarks.push(format!("on a bound, within a shape that the data hardly tell: {names}"));
-    }
-    shape
 }
 
-/// What the scatter of v_y makes of the rear slip at the mean speed, against the slip at which the rear tires bend.
+/// What the scatter of v_y makes of the rear slip at the mean speed, against the slip at which the rear tires bend: what to mend first where the curves are
+/// not known well enough.
 fn lateral_velocity(outcome: &Outcome, verdict: &mut Verdict) {
-    let rear = &outcome.phi_p.rear;
+    let rear = &outcome.found.rear;
     let knee_rad = rear.d / rear.normalized_stiffness();
     let scatter_mps = outcome.rmse.noise[0];
     let scatter_rad = scatter_mps / outcome.mean_speed_mps;
     if scatter_rad <= V_Y_SHARE * knee_rad {
         return;
     }
-    verdict.against.push(format!(
-        "v_y scatters by {scatter_mps:.3} m/s about any model: {:.1} degrees of slip where the rear tires bend at {:.1} degrees (at most {:.0} % \
-         of it can be used); it cannot support the rear tires",
+    verdict.remarks.push(format!(
+        "v_y scatters by {scatter_mps:.3} m/s about any model: {:.1} degrees of slip where the rear tires bend at {:.1} degrees",
         scatter_rad.to_degrees(),
         knee_rad.to_degrees(),
-        100.0 * V_Y_SHARE
     ));
     verdict.drive.push(
         "feed a v_y that is measured: motion capture, two antennas, an optical sensor, or an estimator with side slip"
@@ -93,28 +102,48 @@ fn lateral_velocity(outcome: &Outcome, verdict: &mut Verdict) {
     );
 }
 
-/// Whether held-out data are predicted better than by what was there before.
+/// Whether the tires found say more of held-out data than those that the run began with. A set in use is another matter: it may be as good, and is
+/// kept by whoever has it.
 fn prediction(run: &Identification, outcome: &Outcome, verdict: &mut Verdict) {
     let rollout = &outcome.rmse.rollout;
-    let (limit, than) = match run.previous {
-        Some(_) => (NO_WORSE * rollout.before, "the set in use"),
-        None => (rollout.before, "the initial tires"),
-    };
-    if rollout.after.is_nan() || rollout.after > limit {
+    if rollout.after.is_nan() || run.previous.is_none() && rollout.after > rollout.before {
         verdict.against.push(format!(
-            "held-out rollouts miss by {:.3} noises, with {than} by {:.3}",
+            "held-out rollouts miss by {:.3} noises, with the initial tires by {:.3}: what was found is of no use",
             rollout.after, rollout.before
         ));
     }
 }
 
 /// Whether the car would run straight at the speeds that it was driven at.
-fn stability(run: &Identification, outcome: &Outcome, verdict: &mut Verdict) {
-    if let Some(v_mps) = unstable_at_mps(&run.vehicle, &outcome.phi_p, &outcome.v_x_range_mps) {
+fn stability(run: &Identification, envelope: &Envelope, outcome: &Outcome, verdict: &mut Verdict) {
+    if let Some(v_mps) = unstable_at_mps(&run.vehicle, &envelope.tires, &outcome.v_x_range_mps) {
         verdict.against.push(format!(
             "the car would be unstable above {v_mps:.1} m/s, and was driven at {:.1} m/s",
             outcome.v_x_range_mps.high
         ));
+    }
+}
+
+/// Curves that are not known well enough to steer by.
+fn forces(envelope: &Envelope, outcome: &Outcome, verdict: &mut Verdict) {
+    let stiffness = &outcome.cornering_stiffness_n_per_rad;
+    for (axle, k, factor) in [
+        ("front", stiffness.front, envelope.factor.front),
+        ("rear", stiffness.rear, envelope.factor.rear),
+    ] {
+        let stiff = k.high / k.low;
+        if stiff.is_nan() || stiff > KNOWN_WITHIN {
+            verdict.against.push(format!(
+                "{axle} cornering stiffness is known to a factor of {stiff:.1} only (90 % interval; {KNOWN_WITHIN:.1} can be steered by)"
+            ));
+        } else if factor.is_nan() || factor > KNOWN_WITHIN {
+            verdict.unknown.push(format!(
+                "{axle} force over the slips driven is known to a factor of {factor:.1} only (90 % interval; {KNOWN_WITHIN:.1} can be steered by)"
+            ));
+        } else {
+            continue;
+        }
+        verdict.drive.push(format!("drive longer, with more turn-ins below the limit of the {axle} tires"));
     }
 }
 
@@ -131,7 +160,7 @@ fn convergence(outcome: &Outcome, verdict: &mut Verdict) {
 
 /// Corrections of the signals that the data do not hold.
 fn signals(run: &Identification, outcome: &Outcome, verdict: &mut Verdict) {
-    let Verdict { against, remarks, drive } = verdict;
+    let Verdict { against, remarks, drive, .. } = verdict;
     for (name, value) in &run.direct.signals_on_bound {
         // A controller steers by the stiffness: one that the data do not hold must not reach it.
         let list = if name.ends_with(".k") { &mut *against } else { &mut *remarks };
@@ -141,7 +170,7 @@ fn signals(run: &Identification, outcome: &Outcome, verdict: &mut Verdict) {
     }
     let delay_s = outcome.signals.steering_delay_s;
     if delay_s > LONGEST_DELAY_S {
-        against.push(format!(
+        remarks.push(format!(
             "the car answers {delay_s:.2} s after the recorded steering, later than a steering (at most {LONGEST_DELAY_S} s): filtered odometry or clocks \
              that differ; lever arm and stiffnesses bear what a delay does not explain of it"
         ));
@@ -162,70 +191,34 @@ fn signals(run: &Identification, outcome: &Outcome, verdict: &mut Verdict) {
     }
 }
 
-/// Stiffnesses that are not known well enough to steer by.
-fn stiffnesses(outcome: &Outcome, verdict: &mut Verdict) {
-    let Verdict { against, drive, .. } = verdict;
-    let stiffness = &outcome.cornering_stiffness_n_per_rad;
-    for (axle, k) in [("front", stiffness.front), ("rear", stiffness.rear)] {
-        let share = (k.high - k.value) / k.value;
-        if share.is_nan() || share > STIFFNESS_KNOWN {
-            against.push(format!(
-                "{axle} cornering stiffness is known to {:.0} % only (90 % interval; at most {:.0} % can be used)",
-                100.0 * share,
-                100.0 * STIFFNESS_KNOWN
-            ));
-            drive.push(format!("drive longer, with more turn-ins below the limit of the {axle} tires"));
-        }
-    }
-}
-
-/// Peaks that were not reached, and priors in their place; `shape` names the C and E on a bound.
-fn peaks(run: &Identification, outcome: &Outcome, shape: &[String], verdict: &mut Verdict) {
-    let Verdict { against, remarks, drive } = verdict;
+/// Peaks that were not reached, and priors that have a say there.
+fn peaks(run: &Identification, outcome: &Outcome, verdict: &mut Verdict) {
+    let Verdict { remarks, drive, .. } = verdict;
     let peak = &outcome.peak_friction;
     let evidence = &run.direct.peak;
     for (axle, friction, slip, shown) in [
         ("front", &peak.front, &outcome.slip_range_rad.front, &evidence.front),
         ("rear", &peak.rear, &outcome.slip_range_rad.rear, &evidence.rear),
     ] {
-        let PeakFriction { value, reached, from_prior, .. } = *friction;
+        let PeakFriction { reached, .. } = *friction;
         if reached {
             continue;
         }
         let furthest = slip.low.abs().max(slip.high.abs()).to_degrees();
-        let what = format!("{axle} peak not reached: slip stayed within {furthest:.1} degrees");
-        if from_prior {
-            let bent: Vec<_> = shape.iter().filter(|name| name.starts_with(axle)).cloned().collect();
-            let mu = run.prior.map_or(f64::NAN, |p| p.mu);
-            if run.prior.is_some_and(|p| shown.agrees_with(p)) {
-                let height = shown.height;
-                remarks.push(format!(
-                    "{what}; D = {value:.2} lies between the prior's {mu:.2} and the force shown, {height:.2}"
-                ));
-            } else if bent.is_empty() {
-                remarks.push(format!(
-                    "{what}; D = {value:.2} is the prior's {mu:.2}, moved as far as data and its sigma say"
-                ));
-            } else {
-                // Refuses 16 of 112 development draws (5000-5119) with a prior 0.4 too high, and 4 with the right one.
-                against.push(format!(
-                    "{what}; with D = {value:.2}, the prior's, {} must be on a bound: the prior contradicts the curve that was driven",
-                    bent.join(", ")
-                ));
+        let what = format!(
+            "{axle} peak not reached: slip stayed within {furthest:.1} degrees, the force shown is {:.2} of the load",
+            shown.height
+        );
+        remarks.push(match run.prior {
+            None => what,
+            Some(prior) if shown.contradicts_prior => {
+                format!("{what}; the friction prior of {:.2} contradicts the data, which fit far worse with it", prior.mu)
             }
-        } else if let Some(prior) = run.prior {
-            let contradiction = if shown.contradicts_prior {
-                "contradicts the data, which fit far worse with it"
-            } else {
-                "is below the force that these tires showed"
-            };
-            against.push(format!(
-                "{what}; the friction prior of {:.2} {contradiction}; D = {value:.2} is a guess",
-                prior.mu
-            ));
-        } else {
-            against.push(format!("{what}; D = {value:.2} is a guess, give a friction prior"));
-        }
+            Some(prior) if !shown.is_the_priors(prior) => {
+                format!("{what}; the friction prior of {:.2} is below the force that these tires showed", prior.mu)
+            }
+            Some(prior) => format!("{what}; the provisional set rests on the friction prior of {:.2}", prior.mu),
+        });
         drive.push(format!(
             "corner harder until the {axle} tires slide (more than {furthest:.1} degrees of slip)"
         ));

@@ -6,7 +6,7 @@ use gripsight_signals::StateSequence;
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 use serde::{Deserialize, Serialize};
 
-use crate::{Config, Nuisance};
+use crate::{Config, Nuisance, Status, ValidWithin};
 
 /// An estimate with its 90 % interval; ends that are not known are NaN (null in JSON).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -208,9 +208,15 @@ pub struct AcceptedSet {
     pub vehicle_hash: String,
     /// The sequence that it came from.
     pub sequence_id: u64,
-    /// The tires.
+    /// The tires found.
     pub phi_p: PacejkaParameters,
-    /// The signals' corrections that go with them.
+    /// The tires handed on: no more force than was shown.
+    pub promised: PacejkaParameters,
+    /// What they may be used for.
+    pub status: Status,
+    /// Slips and forces up to which they are valid.
+    pub valid_within: ValidWithin,
+    /// The signals' corrections that go with the tires found.
     pub corrections: SignalCorrections,
     /// What the fit allowed for beside them.
     pub nuisance: Nuisance,

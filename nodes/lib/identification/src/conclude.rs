@@ -8,14 +8,15 @@ use gripsight_vehicle::{
 
 use crate::data::Part;
 use crate::direct::{PeakEvidence, axle_sigma, standard_error};
+use crate::envelope::Envelope;
 use crate::judge::{best_starts, errors_over_horizon, one_step_errors, rollout_errors};
 use crate::picture::{curves, trace};
 use crate::rollout::{NAMES, PARAMETERS, SIGNALS, TireRollout, vector_of};
 use crate::tires::on_bound;
 use crate::{
-    Change, Config, Estimate, FrictionPrior, HorizonError, Identification, Nuisance, Outcome, PeakFriction,
-    PerAxle, Range, ResidualKind, Rmse, RmseReport, RunKey, SignalCorrections, SignalEstimates, Source,
-    Trace, WeakSignal,
+    Change, Config, Estimate, FrictionPrior, HorizonError, Identification, IdentificationError, Nuisance,
+    Outcome, PeakFriction, PerAxle, ProvisionalSet, Range, ResidualKind, Rmse, RmseReport, RunKey,
+    SignalCorrections, SignalEstimates, Source, Status, Trace, ValidWithin, WeakSignal,
 };
 
 /// The residual loop has to beat the direct fit on the validation part by this share: of near equals the simpler wins.
@@ -51,12 +52,16 @@ pub(crate) fn refused(
         low: f64::NAN,
         high: f64::NAN,
         reached: false,
-        from_prior: request.prior.is_some(),
+        from_prior: false,
     };
     let change = Change { before: f64::NAN, after: f64::NAN };
     let rmse = Rmse { before: f64::NAN, after: f64::NAN, v_y_mps: change, yaw_rate_radps: change };
     Outcome {
         phi_p: *request.initial,
+        found: *request.initial,
+        status: Status::Rejected,
+        valid_within: ValidWithin::NOWHERE,
+        provisional: None,
         cornering_stiffness_n_per_rad: PerAxle { front: unknown, rear: unknown },
         peak_friction: PerAxle { front: peak(&request.initial.front), rear: peak(&request.initial.rear) },
         iterations: 0,
@@ -90,13 +95,15 @@ pub(crate) fn refused(
 }
 
 /// The outcome of a run that went through its turns.
-pub(crate) fn conclude(run: &Identification, converged: bool) -> Outcome {
-    let (phi_p, source) = choose(run);
+pub(crate) fn conclude(run: &Identification, converged: bool) -> Result<Outcome, IdentificationError> {
+    let (found, source) = choose(run);
+    let stiffness = stiffness(run, &found);
+    let envelope = Envelope::of(run, &found, &stiffness)?;
     let corrections = run.direct.corrections;
     let rollout = TireRollout::new(&run.vehicle, &run.data);
     let test = run.data.part(Part::Test);
     let noise = run.direct.scatter;
-    let after = vector_of(&phi_p, &corrections, &run.direct.nuisance);
+    let after = vector_of(&found, &corrections, &run.direct.nuisance);
     let before_corrections = run.previous.as_ref().map_or(SignalCorrections::NONE, |p| p.corrections);
     let before = vector_of(&run.initial, &before_corrections, &run.direct.nuisance);
     let rmse = |errors: fn(
@@ -129,9 +136,13 @@ pub(crate) fn conclude(run: &Identification, converged: bool) -> Outcome {
     let slips = PerAxle { front: run.direct.slips.front.range_rad, rear: run.direct.slips.rear.range_rad };
     let (key, request_initial) = (run.candidate.key.clone(), run.initial);
     let mut outcome = Outcome {
-        phi_p,
-        cornering_stiffness_n_per_rad: stiffness(run, &phi_p),
-        peak_friction: peak_friction(run, &phi_p),
+        phi_p: found,
+        found,
+        status: Status::Rejected,
+        valid_within: ValidWithin::NOWHERE,
+        provisional: provisional(run),
+        cornering_stiffness_n_per_rad: stiffness,
+        peak_friction: peak_friction(run, &found),
         iterations: key.iteration,
         converged,
         accepted: false,
@@ -151,11 +162,11 @@ pub(crate) fn conclude(run: &Identification, converged: bool) -> Outcome {
         },
         rollout_error,
         source,
-        on_bound: on_bound(&phi_p),
+        on_bound: on_bound(&found),
         initial: request_initial,
         least_squares: Some(run.direct.tires),
         history: run.history.clone(),
-        curves: curves(run, &phi_p),
+        curves: curves(run, &found),
         prior: run.prior,
         grip: run.grip.clone(),
         health: run.data.health.clone(),
@@ -165,8 +176,8 @@ pub(crate) fn conclude(run: &Identification, converged: bool) -> Outcome {
         vehicle: run.vehicle.clone(),
         trace: trace(run, &before, &after),
     };
-    crate::acceptance::judge(run, &mut outcome);
-    outcome
+    crate::acceptance::judge(run, &envelope, &mut outcome);
+    Ok(outcome)
 }
 
 /// The tires that predict the validation part best; with the paper's method those that leave the smallest residual on it.
@@ -214,30 +225,43 @@ fn stiffness(run: &Identification, tires: &PacejkaParameters) -> PerAxle<Estimat
     }
 }
 
+/// D of the tires found, which the data alone have a say in.
 fn peak_friction(run: &Identification, tires: &PacejkaParameters) -> PerAxle<PeakFriction> {
     let axle = |axle: &MagicFormula, direct: &MagicFormula, peak: &PeakEvidence| {
-        let reached = peak.reached;
-        if reached {
-            let off = (axle.d - direct.d).abs();
-            let (low, high) = ((axle.d - peak.below - off).max(0.0), axle.d + peak.above + off);
-            PeakFriction { value: axle.d, low, high, reached, from_prior: false }
+        let off = (axle.d - direct.d).abs();
+        let (low, high) = if peak.reached {
+            ((axle.d - peak.below - off).max(0.0), axle.d + peak.above + off)
         } else {
-            let from_prior = peak.is_the_priors(run.prior);
-            let half = run.prior.filter(|_| from_prior).map_or(f64::NAN, |p| Estimate::Z90 * axle_sigma(p));
-            PeakFriction {
-                value: axle.d,
-                low: (axle.d - half).max(0.0),
-                high: axle.d + half,
-                reached,
-                from_prior,
-            }
-        }
+            (f64::NAN, f64::NAN)
+        };
+        PeakFriction { value: axle.d, low, high, reached: peak.reached, from_prior: false }
     };
     let (peak, direct) = (&run.direct.peak, &run.direct.tires);
     PerAxle {
         front: axle(&tires.front, &direct.front, &peak.front),
         rear: axle(&tires.rear, &direct.rear, &peak.rear),
     }
+}
+
+/// The set with the friction prior; `None` where it has no say.
+fn provisional(run: &Identification) -> Option<ProvisionalSet> {
+    let (prior, tires) = (run.prior?, run.direct.with_prior?);
+    let half = Estimate::Z90 * axle_sigma(prior);
+    let axle = |axle: &MagicFormula, peak: &PeakEvidence| {
+        let from_prior = peak.is_the_priors(prior);
+        let (below, above) = if from_prior { (half, half) } else { (peak.below, peak.above) };
+        PeakFriction {
+            value: axle.d,
+            low: (axle.d - below).max(0.0),
+            high: axle.d + above,
+            reached: peak.reached,
+            from_prior,
+        }
+    };
+    let (peak, phi_p) = (&run.direct.peak, tires);
+    let peak_friction =
+        PerAxle { front: axle(&tires.front, &peak.front), rear: axle(&tires.rear, &peak.rear) };
+    Some(ProvisionalSet { phi_p, peak_friction })
 }
 
 fn signal_intervals(run: &Identification) -> SignalEstimates {

@@ -5,8 +5,8 @@
 //!    which no simple model gets right, stays out of them.
 //! 2. All parameters on all windows. Gain and lever arm are freed only where that is worth it: at nearly one speed they are the stiffnesses in
 //!    disguise.
-//! 3. The friction prior bounds D softly on an axle whose peak the data do not reach, and the last fit is repeated with it; unless the data
-//!    contradict it. Where the peak is reached it has no say.
+//! 3. Beside that, and never in its place: where the peak is not reached the last fit is repeated with the friction prior as a soft bound on D;
+//!    unless the data contradict it.
 //!
 //! Which is identifiable from what: the yaw rate's bias from the heading alone (fixed then); delay from transients; offset and bias of v_y from driving
 //! straight; gain (against K_f) and lever arm (against K_r) from a range of speeds, and from nothing else. Every one has a prior.
@@ -71,6 +71,8 @@ pub(crate) struct Direct {
     pub(crate) scatter: [f64; 2],
     pub(crate) slips: PerAxle<Slips>,
     pub(crate) peak: PerAxle<PeakEvidence>,
+    /// The tires with the friction prior, where it has a say and the data do not contradict it.
+    pub(crate) with_prior: Option<PacejkaParameters>,
 }
 
 /// Slip angles visited, from the fitted trajectories (free of sensor noise).
@@ -80,6 +82,13 @@ pub(crate) struct Slips {
     pub(crate) samples_rad: Vec<f64>,
     /// 0.5th to 99.5th percentile.
     pub(crate) range_rad: Range,
+}
+
+impl Slips {
+    /// The largest slip driven.
+    pub(crate) fn furthest_rad(&self) -> f64 {
+        self.range_rad.low.abs().max(self.range_rad.high.abs())
+    }
 }
 
 pub(crate) fn direct(
@@ -103,25 +112,15 @@ pub(crate) fn direct(
 
     let (start, weights) = fitter.first(&all, &delays_s, LOW_SHARE * limit_mps2)?;
     restart(&mut all, &start.parameters);
-    let (mut all, mut found, weights, shift) = fitter.refine(&all, weights);
+    let (all, found, weights, shift) = fitter.refine(&all, weights);
 
-    let (slips, _) = fitter.visited(&found);
+    let (slips, points) = fitter.visited(&found);
     let mut peak =
         PerAxle { front: evidence(&found, 0, &slips.front), rear: evidence(&found, 4, &slips.rear) };
-    if let Some(prior) =
-        prior.filter(|_| [peak.front, peak.rear].iter().any(|axle| axle.is_the_priors(prior)))
-    {
-        let [held, likely] = with_prior(&all, &found, &peak, prior)
-            .map(|all| (fitter.solve(&all, &fitter.training, &weights.sigma, 30), all));
-        let better = likely.0.linearization.cost < held.0.linearization.cost;
-        let (with_it, held) = if better { likely } else { held };
-        if contradicts(prior, &peak, &found, &with_it) {
-            peak.front.contradicts_prior = true;
-            peak.rear.contradicts_prior = true;
-        } else {
-            (all, found) = (held, with_it);
-        }
-    }
+    let with_prior = match prior {
+        Some(prior) => fitter.with_prior(&all, &found, &mut peak, prior, &weights)?,
+        None => None,
+    };
     if found.stop == StopReason::NotFinite || found.parameters.iter().any(|v| !v.is_finite()) {
         return Err(IdentificationError::NotFinite { what: "direct fit" });
     }
@@ -138,13 +137,12 @@ pub(crate) fn direct(
         (parameter.low, parameter.high) = (parameter.low - width, parameter.high + width);
     }
     let errors = fitter.solve(&open, &fitter.training, &weights.sigma, 0);
-    let (slips, points) = fitter.visited(&found);
     let allowed = nuisance_of(&found.parameters);
     let fitted = tires_of(&found.parameters);
     Ok(Direct {
         tires: PacejkaParameters {
-            front: nearest(&points.front, &fitted.front, peak.front.prior_range(prior, fitted.front.d))?,
-            rear: nearest(&points.rear, &fitted.rear, peak.rear.prior_range(prior, fitted.rear.d))?,
+            front: nearest(&points.front, &fitted.front, None)?,
+            rear: nearest(&points.rear, &fitted.rear, None)?,
         },
         corrections: corrections_of(&found.parameters),
         nuisance: Nuisance { combined_slip: 0.0, ..allowed },
@@ -166,6 +164,7 @@ pub(crate) fn direct(
         scatter: weights.scatter,
         slips,
         peak,
+        with_prior,
     })
 }
 
@@ -277,7 +276,7 @@ impl Fitter<'_> {
             }
         }
         let mut shift = [0.0; PARAMETERS];
-        if best.linearization.cost < (1.0 - WORTH) * found.linearization.cost {
+        if best.linearization.cost < (1.0 - WORTH) * found.linearization.cost && self.speeds_part() {
             (all, found) = (freed, best);
         } else {
             shift = std::array::from_fn(|j| best.parameters[j] - found.parameters[j]);
@@ -288,6 +287,48 @@ impl Fitter<'_> {
             found = self.solve(&all, &self.training, &weights.sigma, 15);
         }
         (all, found, weights, shift)
+    }
+
+    /// The tires with the friction prior as a soft bound on D where the data do not show it; `None` where it has no say. Where the data contradict it,
+    /// that is said of the peaks.
+    fn with_prior(
+        &self,
+        all: &[Parameter],
+        found: &Fit,
+        peak: &mut PerAxle<PeakEvidence>,
+        prior: FrictionPrior,
+        weights: &Weights,
+    ) -> Result<Option<PacejkaParameters>, IdentificationError> {
+        if ![peak.front, peak.rear].iter().any(|axle| axle.is_the_priors(prior)) {
+            return Ok(None);
+        }
+        let [held, likely] =
+            with_prior(all, found, peak, prior).map(|all| self.solve(&all, &self.training, &weights.sigma, 30));
+        let with_it = if likely.linearization.cost < held.linearization.cost { likely } else { held };
+        if contradicts(prior, peak, found, &with_it) {
+            peak.front.contradicts_prior = true;
+            peak.rear.contradicts_prior = true;
+            return Ok(None);
+        }
+        let (_, points) = self.visited(&with_it);
+        let tires = tires_of(&with_it.parameters);
+        let axle = |points, tire: &MagicFormula, peak: &PeakEvidence| {
+            // What was shown is a lower bound.
+            let d = tire.d.max(peak.height);
+            nearest(points, tire, peak.is_the_priors(prior).then_some((d, d)))
+        };
+        Ok(Some(PacejkaParameters {
+            front: axle(&points.front, &tires.front, &peak.front)?,
+            rear: axle(&points.rear, &tires.rear, &peak.rear)?,
+        }))
+    }
+
+    /// Whether the speeds driven part a lever arm from the stiffnesses. In a steady turn it adds l a_y/v^2 to the rear slip where the tires add a_y/(g k):
+    /// what it adds has to halve over the speeds.
+    fn speeds_part(&self) -> bool {
+        let mut speeds: Vec<f64> = self.data.samples(|s, k| s.v_x_mps[k]).collect();
+        let [slow, fast] = [0.05, 0.95].map(|share| quantile(&mut speeds, share).unwrap_or(f64::NAN));
+        fast > std::f64::consts::SQRT_2 * slow
     }
 
     /// Slip angles, and F_y/F_z at them, along the fitted trajectories.

@@ -9,9 +9,11 @@ mod conclude;
 mod config;
 mod data;
 mod direct;
+mod envelope;
 mod error;
 pub mod export;
 mod extract;
+mod grip;
 mod judge;
 mod live;
 mod monitor;
@@ -30,12 +32,14 @@ pub use candidate::{
     AcceptedSet, Candidate, Estimate, FrictionPrior, PerAxle, Range, RunKey, SignalCorrections, vehicle_hash,
 };
 pub use config::{Config, Method, ResidualKind};
+pub use envelope::ValidWithin;
 pub use error::IdentificationError;
+pub use grip::{GripLook, GripWatch};
 pub use live::{LiveResidual, LiveSample};
 pub use monitor::{Monitor, Reading};
 pub use outcome::{
-    Change, HorizonError, IterationRecord, Outcome, PeakFriction, Rmse, RmseReport, SignalEstimates, Source,
-    TireCurve, Trace, WeakSignal,
+    Change, HorizonError, IterationRecord, Outcome, PeakFriction, ProvisionalSet, Rmse, RmseReport,
+    SignalEstimates, Source, Status, TireCurve, Trace, WeakSignal,
 };
 pub use residual::train_residual;
 pub use residual_model::{INPUTS, OUTPUTS, ResidualModel};

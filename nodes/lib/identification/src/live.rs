@@ -42,9 +42,7 @@ pub struct LiveResidual {
     network: Option<ResidualNetwork>,
     car: SingleTrack,
     stiffness: f64,
-    corrections: SignalCorrections,
-    /// Recorded steering by stamp, oldest first.
-    steering: VecDeque<(i64, f64)>,
+    corrected: Corrected,
     /// The samples of the last time step, oldest first.
     recent: VecDeque<Passed>,
 }
@@ -75,8 +73,7 @@ impl LiveResidual {
             network: model.network()?,
             car: SingleTrack::new(vehicle, phi),
             stiffness: phi.front.normalized_stiffness().max(phi.rear.normalized_stiffness()),
-            corrections,
-            steering: VecDeque::new(),
+            corrected: Corrected::new(corrections),
             recent: VecDeque::new(),
             model,
         })
@@ -90,7 +87,7 @@ impl LiveResidual {
 
     /// Forgets every sample: after a jump of the clock.
     pub fn reset(&mut self) {
-        self.steering.clear();
+        self.corrected.clear();
         self.recent.clear();
     }
 
@@ -100,7 +97,7 @@ impl LiveResidual {
     /// [`IdentificationError::Network`] where the network overflows: every sample is forgotten then.
     pub fn push(&mut self, sample: &TelemetrySample) -> Result<Option<LiveSample>, IdentificationError> {
         let stamp_ns = sample.odometry.stamp_ns;
-        let (state, input) = self.corrected(sample);
+        let (state, input) = self.corrected.push(sample);
         if input.v_x_mps < SLOW_MPS {
             self.recent.clear();
             return Ok(None);
@@ -158,8 +155,28 @@ impl LiveResidual {
         }
     }
 
+}
+
+/// Takes what identification found of the signals out of samples, in the order of their stamps.
+#[derive(Debug, Clone)]
+pub(crate) struct Corrected {
+    corrections: SignalCorrections,
+    /// Recorded steering by stamp, oldest first.
+    steering: VecDeque<(i64, f64)>,
+}
+
+impl Corrected {
+    pub(crate) fn new(corrections: SignalCorrections) -> Self {
+        Self { corrections, steering: VecDeque::new() }
+    }
+
+    /// Forgets every sample.
+    pub(crate) fn clear(&mut self) {
+        self.steering.clear();
+    }
+
     /// State of the centre of gravity and input, signals corrected.
-    fn corrected(&mut self, sample: &TelemetrySample) -> (State, Input) {
+    pub(crate) fn push(&mut self, sample: &TelemetrySample) -> (State, Input) {
         let (odometry, c) = (&sample.odometry, &self.corrections);
         let yaw_rate_radps = odometry.yaw_rate_radps - c.yaw_rate_bias_radps;
         let state = State {

@@ -55,6 +55,15 @@ impl Reading {
         })
     }
 
+    /// Whether grip has fallen below what a set promises.
+    #[must_use]
+    pub fn fallen(&self, set: &AcceptedSet) -> bool {
+        let below = |now: &Estimate, promised: f64| now.high < promised;
+        self.changed
+            && (below(&self.peak_factor.front, set.promised.front.d)
+                || below(&self.peak_factor.rear, set.promised.rear.d))
+    }
+
     /// What the change says of the road, if there was one: the tires' shape is the old one, so the force below the peak tells the peak.
     pub(crate) fn prior(&self) -> Option<FrictionPrior> {
         let PerAxle { front, rear } = self.peak_factor;

@@ -2,12 +2,54 @@
 
 use gripsight_signals::DataHealth;
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     AcceptedSet, Config, Estimate, FrictionPrior, Nuisance, PerAxle, Range, Reading, RunKey,
-    SignalCorrections,
+    SignalCorrections, ValidWithin,
 };
+
+/// What a set may be used for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// The peak of both axles is known.
+    Accepted,
+    /// No force is promised beyond what the drive has shown: [`Outcome::valid_within`].
+    AcceptedWithin,
+    /// The peak rests on a friction prior: for whoever asks for it.
+    Provisional,
+    /// Unusable.
+    Rejected,
+}
+
+impl Status {
+    /// Its name in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Accepted => "accepted",
+            Self::AcceptedWithin => "accepted_within",
+            Self::Provisional => "provisional",
+            Self::Rejected => "rejected",
+        }
+    }
+
+    /// Whether a controller may use the set without asking for more.
+    #[must_use]
+    pub fn accepted(self) -> bool {
+        matches!(self, Self::Accepted | Self::AcceptedWithin)
+    }
+}
+
+/// The set with a friction prior where the data do not reach the peak, beside the one that the data alone give.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ProvisionalSet {
+    /// The tires.
+    pub phi_p: PacejkaParameters,
+    /// D; `from_prior` says of which axle it is the prior's.
+    pub peak_friction: PerAxle<PeakFriction>,
+}
 
 /// Peak friction of one axle, and what the value rests on.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -204,18 +246,26 @@ pub struct Trace {
 /// The result of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outcome {
-    /// The tires, Phi_p.
+    /// The tires to use, Phi_p: they promise no more force than the drive has shown. Where the set is rejected, those found.
     pub phi_p: PacejkaParameters,
-    /// B C D F_z.
+    /// The tires found: the most likely curves, whatever was shown of them.
+    pub found: PacejkaParameters,
+    /// What the tires to use may be used for.
+    pub status: Status,
+    /// Slips and forces up to which they are valid.
+    pub valid_within: ValidWithin,
+    /// With the friction prior, where one was given and has a say.
+    pub provisional: Option<ProvisionalSet>,
+    /// B C D F_z of the tires found.
     pub cornering_stiffness_n_per_rad: PerAxle<Estimate>,
-    /// D.
+    /// D of the tires found.
     pub peak_friction: PerAxle<PeakFriction>,
     /// Turns of the outer loop taken.
     pub iterations: u32,
     /// Whether the last turn changed the tire curves by less than the tolerance; or the last two (the paper's method: one) no longer predict
     /// held-out data better than what was there before them.
     pub converged: bool,
-    /// Whether the set may be used.
+    /// Whether the set may be used: [`Status::accepted`].
     pub accepted: bool,
     /// Why not; or what an accepted set must be read with. Each with its figure.
     pub reasons: Vec<String>,
@@ -268,14 +318,31 @@ pub struct Outcome {
     pub trace: Trace,
 }
 
+/// A set that promises this much less than the one in use does not take its place: what was shown is not forgotten in a slower lap.
+const NO_LESS: f64 = 0.98;
+
 impl Outcome {
+    /// Whether the set is to be used in place of another one: it is accepted, and knows more, or the other one no longer fits.
+    #[must_use]
+    pub fn replaces(&self, in_use: Option<&AcceptedSet>) -> bool {
+        let Some(set) = in_use else { return self.accepted };
+        let changed = self.grip.as_ref().is_some_and(|reading| reading.changed);
+        let shown = |tires: &PacejkaParameters| tires.front.d.min(tires.rear.d);
+        let keeps = set.status == Status::Accepted && self.status == Status::AcceptedWithin;
+        self.accepted && (changed || !keeps && shown(&self.phi_p) >= NO_LESS * shown(&set.promised))
+    }
+
+
     /// What later runs start from and the monitor watches; `None` where the set was not accepted.
     #[must_use]
     pub fn accepted_set(&self) -> Option<AcceptedSet> {
         self.accepted.then(|| AcceptedSet {
             vehicle_hash: self.key.vehicle_hash.clone(),
             sequence_id: self.key.sequence_id,
-            phi_p: self.phi_p,
+            phi_p: self.found,
+            promised: self.phi_p,
+            status: self.status,
+            valid_within: self.valid_within,
             corrections: self.signals,
             nuisance: Nuisance { combined_slip: 0.0, ..self.nuisance },
             rollout_rmse: [self.rmse.rollout.v_y_mps.after, self.rmse.rollout.yaw_rate_radps.after],

@@ -3,10 +3,11 @@
 use gripsight_model::{Rollout, Window};
 use gripsight_vehicle::{MagicFormula, PacejkaParameters, SingleTrack};
 
-use crate::direct::{Slips, covariance_of, force_error};
+use crate::direct::Slips;
+use crate::envelope::half_width;
 use crate::judge::best_starts;
 use crate::rollout::{PARAMETERS, TireRollout, tires_of};
-use crate::{Estimate, Identification, PerAxle, TireCurve, Trace};
+use crate::{Identification, PerAxle, TireCurve, Trace};
 
 /// Points of a curve.
 const POINTS: usize = 60;
@@ -18,22 +19,21 @@ const AT_LEAST_RAD: f64 = 0.2;
 
 /// The curves of both axles.
 pub(crate) fn curves(run: &Identification, tires: &PacejkaParameters) -> PerAxle<TireCurve> {
-    let (slips, initial) = (&run.direct.slips, &run.initial);
+    let (slips, initial, direct) = (&run.direct.slips, &run.initial, &run.direct.tires);
+    let half = |axle, direct, offset| move |slips: &[f64]| half_width(run, axle, direct, offset, slips);
     PerAxle {
-        front: curve(run, &tires.front, &initial.front, &slips.front, 0),
-        rear: curve(run, &tires.rear, &initial.rear, &slips.rear, 4),
+        front: curve(&tires.front, &initial.front, &slips.front, half(&tires.front, &direct.front, 0)),
+        rear: curve(&tires.rear, &initial.rear, &slips.rear, half(&tires.rear, &direct.rear, 4)),
     }
 }
 
 fn curve(
-    run: &Identification,
     axle: &MagicFormula,
     initial: &MagicFormula,
     slips: &Slips,
-    offset: usize,
+    half_width: impl Fn(&[f64]) -> Vec<f64>,
 ) -> TireCurve {
-    let furthest = slips.range_rad.low.abs().max(slips.range_rad.high.abs());
-    let end_rad = (BEYOND * furthest).max(AT_LEAST_RAD);
+    let end_rad = (BEYOND * slips.furthest_rad()).max(AT_LEAST_RAD);
     let last = (POINTS - 1) as f64;
     let slip_rad: Vec<f64> = (0..POINTS).map(|k| end_rad * (k as f64 / last).powf(SPACING)).collect();
     let mut density = vec![0; POINTS];
@@ -43,9 +43,7 @@ fn curve(
             *count += 1;
         }
     }
-    let covariance = covariance_of(&run.direct.fit, &[offset, offset + 1, offset + 2, offset + 3]);
-    let half: Vec<f64> =
-        slip_rad.iter().map(|&a| Estimate::Z90 * force_error(axle, a, covariance.as_ref())).collect();
+    let half = half_width(&slip_rad);
     let identified: Vec<f64> = slip_rad.iter().map(|&a| axle.normalized_force(a)).collect();
     TireCurve {
         initial: slip_rad.iter().map(|&a| initial.normalized_force(a)).collect(),

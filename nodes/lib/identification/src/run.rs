@@ -219,7 +219,7 @@ impl Identification {
         let converged = settled || self.stalled();
         if converged || self.candidate.key.iteration >= self.config.max_iterations {
             self.ended = true;
-            return Ok(Next::Done(Box::new(conclude(self, converged))));
+            return Ok(Next::Done(Box::new(conclude(self, converged)?)));
         }
         Ok(Next::Candidate(self.candidate.clone()))
     }
@@ -282,6 +282,11 @@ impl Identification {
 
     fn left_over(&self, tires: &PacejkaParameters) -> [f64; 2] {
         left_over(&self.data, &self.vehicle, &Candidate { phi_p: *tires, ..self.candidate.clone() })
+    }
+
+    /// Highest speed driven.
+    pub(crate) fn top_speed_mps(&self) -> f64 {
+        self.data.samples(|s, k| s.v_x_mps[k]).fold(0.0, f64::max)
     }
 
     /// What some tires leave over, as a share of what the initial ones did.

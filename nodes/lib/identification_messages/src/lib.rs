@@ -2,7 +2,7 @@
 
 use gripsight_identification::{
     Candidate, Estimate, FrictionPrior, INPUTS, IdentificationError, LiveSample, OUTPUTS, Outcome,
-    PeakFriction, Range, ResidualKind, ResidualModel, RunKey, SignalCorrections,
+    PeakFriction, Range, ResidualKind, ResidualModel, RunKey, SignalCorrections, Status,
 };
 use gripsight_msgs as msg;
 use gripsight_vehicle::{MagicFormula, PacejkaParameters, VehicleParameters};
@@ -52,6 +52,10 @@ pub fn proposed(candidate: &Candidate, vehicle: &VehicleParameters) -> msg::Pace
         rear_peak: peak,
         front_slip_rad: nowhere,
         rear_slip_rad: nowhere,
+        front_valid_slip_rad: f64::NAN,
+        rear_valid_slip_rad: f64::NAN,
+        front_valid_force_n: f64::NAN,
+        rear_valid_force_n: f64::NAN,
         signals: signals(&candidate.corrections),
         v_x_mean_mps: candidate.mean_speed_mps,
     }
@@ -68,15 +72,51 @@ pub fn candidate(message: &msg::PacejkaParams) -> Option<Candidate> {
     })
 }
 
-/// The end of a run: status ACCEPTED or REJECTED, the reasons joined.
+/// A status as its message's constant.
+#[must_use]
+pub fn status(status: Status) -> u8 {
+    match status {
+        Status::Accepted => msg::PacejkaParams::ACCEPTED,
+        Status::AcceptedWithin => msg::PacejkaParams::ACCEPTED_WITHIN,
+        Status::Provisional => msg::PacejkaParams::PROVISIONAL,
+        Status::Rejected => msg::PacejkaParams::REJECTED,
+    }
+}
+
+/// The set with the friction prior beside the result of a run: status PROVISIONAL; `None` where the prior has no say.
+#[must_use]
+pub fn provisional(outcome: &Outcome) -> Option<msg::PacejkaParams> {
+    let set = outcome.provisional.as_ref()?;
+    Some(msg::PacejkaParams {
+        status: msg::PacejkaParams::PROVISIONAL,
+        front: formula(&set.phi_p.front),
+        rear: formula(&set.phi_p.rear),
+        front_peak: peak_friction(&set.peak_friction.front),
+        rear_peak: peak_friction(&set.peak_friction.rear),
+        front_valid_slip_rad: f64::NAN,
+        rear_valid_slip_rad: f64::NAN,
+        front_valid_force_n: f64::NAN,
+        rear_valid_force_n: f64::NAN,
+        ..result(outcome)
+    })
+}
+
+/// A set that was published and must not be used any longer: status WITHDRAWN, with the reason.
+#[must_use]
+pub fn withdrawn(published: &msg::PacejkaParams, reason: String) -> msg::PacejkaParams {
+    msg::PacejkaParams { status: msg::PacejkaParams::WITHDRAWN, reason, ..published.clone() }
+}
+
+/// The end of a run, the reasons joined.
 #[must_use]
 pub fn result(outcome: &Outcome) -> msg::PacejkaParams {
     let (k, peak, slip) =
         (&outcome.cornering_stiffness_n_per_rad, &outcome.peak_friction, &outcome.slip_range_rad);
+    let valid = &outcome.valid_within;
     msg::PacejkaParams {
         header: msg::standard::std_msgs::Header::default(),
         handshake: handshake(&outcome.key),
-        status: if outcome.accepted { msg::PacejkaParams::ACCEPTED } else { msg::PacejkaParams::REJECTED },
+        status: status(outcome.status),
         reason: outcome.reasons.join("; "),
         front: formula(&outcome.phi_p.front),
         rear: formula(&outcome.phi_p.rear),
@@ -88,6 +128,10 @@ pub fn result(outcome: &Outcome) -> msg::PacejkaParams {
         rear_peak: peak_friction(&peak.rear),
         front_slip_rad: range(&slip.front),
         rear_slip_rad: range(&slip.rear),
+        front_valid_slip_rad: valid.slip_rad.front,
+        rear_valid_slip_rad: valid.slip_rad.rear,
+        front_valid_force_n: valid.force_n.front,
+        rear_valid_force_n: valid.force_n.rear,
         signals: signals(&outcome.signals),
         v_x_mean_mps: outcome.mean_speed_mps,
     }

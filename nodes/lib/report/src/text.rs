@@ -1,6 +1,6 @@
 //! Numbers as people read them, on pages and on the terminal.
 
-use gripsight_identification::{Estimate, PeakFriction};
+use gripsight_identification::{Estimate, Outcome, PeakFriction, Status};
 
 /// A dash where there is nothing to say.
 const NOTHING: &str = "–";
@@ -65,6 +65,17 @@ pub fn estimate(e: &Estimate) -> String {
 pub fn estimate_of(value: f64, low: f64, high: f64) -> String {
     let (text, range) = with_interval(value, low, high);
     if low == high { text } else { format!("{text} ({range})") }
+}
+
+/// What a set may be used for.
+#[must_use]
+pub fn status(outcome: &Outcome) -> &'static str {
+    match outcome.status {
+        Status::Accepted => "accepted",
+        Status::AcceptedWithin => "accepted within what was driven",
+        Status::Provisional => "provisional: the peak rests on a prior",
+        Status::Rejected => "not accepted",
+    }
 }
 
 /// Peak friction with its interval, or what stands in its place.

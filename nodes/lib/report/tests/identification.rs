@@ -7,8 +7,8 @@ use std::f64::consts::TAU;
 
 use gripsight_identification::{
     Change, Config, Estimate, FrictionPrior, HorizonError, IterationRecord, Nuisance, Outcome, PeakFriction,
-    PerAxle, Range, Rmse, RmseReport, RunKey, SignalCorrections, SignalEstimates, Source, TireCurve, Trace,
-    WeakSignal,
+    PerAxle, ProvisionalSet, Range, Rmse, RmseReport, RunKey, SignalCorrections, SignalEstimates, Source, Status,
+    TireCurve, Trace, ValidWithin, WeakSignal,
 };
 use gripsight_report::{Header, IdentificationInput, identification_page};
 use gripsight_signals::DataHealth;
@@ -58,6 +58,13 @@ fn outcome() -> Outcome {
     let wave = |f: f64, a: f64| time_s.iter().map(|t| a * (TAU * f * t).sin()).collect::<Vec<_>>();
     Outcome {
         phi_p,
+        found: phi_p,
+        status: Status::Accepted,
+        valid_within: ValidWithin {
+            slip_rad: PerAxle { front: 0.21, rear: 0.15 },
+            force_n: PerAxle { front: 7.9, rear: 9.2 },
+        },
+        provisional: None,
         cornering_stiffness_n_per_rad: PerAxle { front: estimate(61.2, 4.0), rear: estimate(83.1, 6.0) },
         peak_friction: PerAxle { front: peak(0.48), rear: peak(0.5) },
         iterations: 3,
@@ -184,14 +191,24 @@ fn the_verdict_says_what_the_figures_rest_on() {
             || page(&accepted).contains("Accepted. Peak friction front 0.480")
     );
 
-    let mut from_prior = outcome();
-    from_prior.peak_friction.front =
+    let mut within = outcome();
+    within.status = Status::AcceptedWithin;
+    within.peak_friction = within.peak_friction.map(|p| PeakFriction { reached: false, ..p });
+    let from_prior =
         PeakFriction { value: 0.6, low: f64::NAN, high: f64::NAN, reached: false, from_prior: true };
-    from_prior.peak_friction.rear = from_prior.peak_friction.front;
-    assert!(page(&from_prior).contains("Peak friction 0.60 from the prior, peak not reached front and rear"));
+    within.provisional = Some(ProvisionalSet {
+        phi_p: within.phi_p,
+        peak_friction: PerAxle { front: from_prior, rear: from_prior },
+    });
+    let html = page(&within);
+    assert!(html.contains(
+        "Accepted within the slips driven, 12.0° front and 8.59° rear, and the forces shown, 7.90 and 9.20 N."
+    ));
+    assert!(html.contains("Peak friction unknown, peak not reached front and rear"));
+    assert!(html.contains("0.60 from the prior"));
 
     let mut rejected = outcome();
-    rejected.accepted = false;
+    (rejected.accepted, rejected.status) = (false, Status::Rejected);
     rejected.reasons = vec!["the peak was not reached and there is no prior".into()];
     rejected.peak_friction.front.reached = false;
     let html = page(&rejected);
@@ -204,7 +221,7 @@ fn the_verdict_says_what_the_figures_rest_on() {
 #[test]
 fn a_refused_run_makes_a_page_without_pictures() {
     let mut refused = outcome();
-    refused.accepted = false;
+    (refused.accepted, refused.status) = (false, Status::Rejected);
     refused.source = Source::Start;
     refused.reasons = vec!["the car hardly turned".into()];
     refused.curves = PerAxle::default();

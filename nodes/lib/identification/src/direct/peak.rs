@@ -27,31 +27,23 @@ pub(crate) struct PeakEvidence {
 impl PeakEvidence {
     /// Whether D is the friction prior's: the data do not show the peak, and the prior is neither further below what they do show than its sigma
     /// nor against them.
-    pub(crate) fn is_the_priors(&self, prior: Option<FrictionPrior>) -> bool {
-        !self.reached && !self.contradicts_prior && prior.is_some_and(|p| p.mu + p.sigma >= self.height)
-    }
-
-    /// Whether a friction prior is the largest force that was shown, within its sigma.
-    pub(crate) fn agrees_with(&self, prior: FrictionPrior) -> bool {
-        (prior.mu - self.height).abs() <= prior.sigma
-    }
-
-    /// Where Phi_p's D may lie, where it is the prior's: between the prior and the force that was shown where they agree, else where the fit left it.
-    pub(crate) fn prior_range(&self, prior: Option<FrictionPrior>, fitted: f64) -> Option<(f64, f64)> {
-        let prior = prior.filter(|_| self.is_the_priors(prior))?;
-        let agreed = (prior.mu.min(self.height), prior.mu.max(self.height));
-        Some(if self.agrees_with(prior) { agreed } else { (fitted, fitted) })
+    pub(crate) fn is_the_priors(&self, prior: FrictionPrior) -> bool {
+        !self.reached && !self.contradicts_prior && prior.mu + prior.sigma >= self.height
     }
 }
 
-/// A peak is reached when D is known to this share of itself.
-const KNOWN: f64 = 0.1;
+/// A tire is beyond its knee where its stiffness alone would give this many times the force that it gives at the largest slip driven,
+const KNEE: f64 = 1.9;
+/// and its peak is reached where the force over the last third of the slips driven rises by less than this power of the slip: both are what tires give at 95 %
+/// of their peak. Brush tires: 1.99 and 0.41 with parabolic pressure, 1.95 and 0.31 with elliptic; Magic Formulas without E: 2.5 and 0.21 (C 1.1),
+/// 1.97 and 0.31 (1.3), 1.68 and 0.41 (1.6).
+const RISE: f64 = 0.4;
+/// Where that last third begins.
+const LAST_THIRD: f64 = 2.0 / 3.0;
 /// Half of the 90 % interval of D that the shape of a four-parameter curve costs, as a share of D: real curves have another shape.
 const FORM: f64 = 0.05;
 /// C of a curve that is one sigma flatter than the likely one: what the peak would be if the tire went on rising where it was not driven.
 const FLATTER_C: f64 = C_PRIOR.mean - C_PRIOR.sigma;
-/// What the stiffness alone would make of the largest slip has to exceed D by this factor: a knee that comes earlier is the model's, not the tire's.
-const PEAK_EXCESS: f64 = 1.6;
 /// No tire slides at less: a knee that comes earlier is made by the signals.
 const LEAST_PEAK_SLIP_RAD: f64 = 0.05;
 
@@ -60,16 +52,22 @@ const LEAST_PEAK_SLIP_RAD: f64 = 0.05;
 pub(super) fn evidence(fit: &Fit, offset: usize, slips: &Slips) -> PeakEvidence {
     let tires = tires_of(&fit.parameters);
     let axle = if offset == 0 { tires.front } else { tires.rear };
-    let furthest = slips.range_rad.low.abs().max(slips.range_rad.high.abs());
+    let furthest = slips.furthest_rad();
     let height = axle.max_force_within(furthest);
-    let error = Estimate::Z90 * height_error(fit, offset, slips);
-    let known = error.hypot(FORM * axle.d);
+    // Of a plateau D alone says little: there C and D make up for each other. Its height, and whether it rises, are well known.
+    let covariance = covariance_of(fit, &[offset, offset + 1, offset + 2, offset + 3]);
+    let error = |figure: &dyn Fn(&MagicFormula) -> f64| error_of(&axle, covariance.as_ref(), figure);
+    let known = (Estimate::Z90 * error(&|axle| axle.max_force_within(furthest))).hypot(FORM * axle.d);
     let below = known.hypot(axle.d - height);
     let above = known.hypot((flatter_peak(&axle, furthest, height) - axle.d).max(0.0));
     let may_bend = furthest > LEAST_PEAK_SLIP_RAD;
-    let reached = below < KNOWN * axle.d
-        && may_bend
-        && axle.normalized_stiffness() * furthest > PEAK_EXCESS * axle.d
+    let rise = |axle: &MagicFormula| {
+        let forces = [furthest, LAST_THIRD * furthest].map(|slip| axle.normalized_force(slip));
+        (forces[0] / forces[1]).ln() / LAST_THIRD.recip().ln()
+    };
+    let reached = may_bend
+        && axle.normalized_stiffness() * furthest > KNEE * height
+        && rise(&axle) + error(&rise) < RISE
         && !fit.on_bound.contains(&(offset + 2));
     PeakEvidence { reached, below, above, height, may_bend, contradicts_prior: false }
 }
@@ -84,16 +82,6 @@ fn flatter_peak(axle: &MagicFormula, furthest_rad: f64, height: f64) -> f64 {
         if curve(middle).max_force_within(furthest_rad) < height { low = middle } else { high = middle }
     }
     high
-}
-
-/// Standard error of the largest F_y/F_z within the slips visited; infinite where nothing is known of it. (That of D alone says little of a
-/// plateau: there C and D make up for each other.)
-fn height_error(fit: &Fit, offset: usize, slips: &Slips) -> f64 {
-    let tires = tires_of(&fit.parameters);
-    let axle = if offset == 0 { tires.front } else { tires.rear };
-    let furthest = slips.range_rad.low.abs().max(slips.range_rad.high.abs());
-    let covariance = covariance_of(fit, &[offset, offset + 1, offset + 2, offset + 3]);
-    error_of(&axle, covariance.as_ref(), |axle| axle.max_force_within(furthest))
 }
 
 /// Standard error of F_y/F_z at a slip, from the covariance of (k, C, D, E); infinite without one.

@@ -21,7 +21,7 @@ pub(crate) fn axle_sigma(prior: FrictionPrior) -> f64 {
 fn places(peak: &PerAxle<PeakEvidence>, prior: FrictionPrior) -> impl Iterator<Item = usize> {
     [(2, peak.front), (6, peak.rear)]
         .into_iter()
-        .filter(move |(_, axle)| axle.is_the_priors(Some(prior)))
+        .filter(move |(_, axle)| axle.is_the_priors(prior))
         .map(|(place, _)| place)
 }
 
@@ -47,7 +47,7 @@ pub(super) fn with_prior(
 }
 
 /// Whether the fit with the prior is so much worse than the one without that one of prior and data is wrong. Only where the slips are such that a tire
-/// bends at all, and not where the prior agrees with the force that was shown.
+/// bends at all. A force shown is a lower bound: that the prior lies near it says nothing for the prior.
 pub(super) fn contradicts(
     prior: FrictionPrior,
     peak: &PerAxle<PeakEvidence>,
@@ -59,6 +59,5 @@ pub(super) fn contradicts(
         places(peak, prior).map(|d| ((with.parameters[d] - prior.mu) / axle_sigma(prior)).powi(2)).sum();
     let axles = [peak.front, peak.rear];
     let bends = axles.iter().any(|axle| !axle.reached && axle.may_bend);
-    let differs = axles.iter().any(|axle| !axle.reached && !axle.agrees_with(prior));
-    bends && differs && windows(with) - windows(without) + away > CONTRADICTION
+    bends && windows(with) - windows(without) + away > CONTRADICTION
 }

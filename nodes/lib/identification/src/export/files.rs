@@ -9,6 +9,7 @@ use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 
 use super::tires::STAMP_COMMENT;
 use super::{ExportError, Provenance, SteeringLookup, controller_txt, mpc_yaml};
+use crate::Status;
 
 /// All that is written for other stacks of one identification.
 #[derive(Debug, Clone, Copy)]
@@ -30,13 +31,14 @@ impl TireFiles<'_> {
     ///
     /// Each file is written beside its place and renamed. A set that is replaced stays beside the new one, its name dated by the
     /// stamp of its own data (`pacejka.20231114T221314Z.yaml`). A set that was not accepted goes to `pacejka.rejected.yaml` and the
-    /// like, and what controllers read stays as it was.
+    /// like, a provisional one to `pacejka.provisional.yaml`, and what controllers read stays as it was. Which of them, the provenance's status says.
+    /// Any other but a provisional set removes a provisional one that is there: write that after it.
     ///
     /// Returns the files in the order above.
     ///
     /// # Errors
     /// [`ExportError::Io`].
-    pub fn write(&self, folder: &Path, accepted: bool) -> Result<[PathBuf; 3], ExportError> {
+    pub fn write(&self, folder: &Path) -> Result<[PathBuf; 3], ExportError> {
         let car = file_name(&self.provenance.car);
         let lookup = SteeringLookup::new(self.vehicle, self.tires, self.driven_mps).to_csv();
         let mpc = mpc_yaml(self.tires, self.floor, self.provenance);
@@ -51,16 +53,26 @@ impl TireFiles<'_> {
         let mut written = [const { PathBuf::new() }; 3];
         for (path, (stem, end, text)) in written.iter_mut().zip(texts) {
             let good = folder.join(format!("{stem}.{end}"));
-            let rejected = folder.join(format!("{stem}.rejected.{end}"));
-            if accepted {
-                keep(&good, &text, &folder.join(format!("{stem}.{kept_date}.{end}")))?;
-                replace(&good, &text)?;
-                remove(&rejected)?;
-                *path = good;
-            } else {
-                replace(&rejected, &text)?;
-                *path = rejected;
-            }
+            let [rejected, provisional] =
+                ["rejected", "provisional"].map(|what| folder.join(format!("{stem}.{what}.{end}")));
+            *path = match self.provenance.status {
+                Status::Accepted | Status::AcceptedWithin => {
+                    keep(&good, &text, &folder.join(format!("{stem}.{kept_date}.{end}")))?;
+                    replace(&good, &text)?;
+                    remove(&rejected)?;
+                    remove(&provisional)?;
+                    good
+                }
+                Status::Provisional => {
+                    replace(&provisional, &text)?;
+                    provisional
+                }
+                Status::Rejected => {
+                    replace(&rejected, &text)?;
+                    remove(&provisional)?;
+                    rejected
+                }
+            };
         }
         Ok(written)
     }

@@ -4,6 +4,7 @@ use gripsight_vehicle::{Input, PacejkaParameters, SingleTrack, State, VehiclePar
 use proptest::prelude::*;
 
 use super::*;
+use crate::{PerAxle, Status, ValidWithin};
 
 fn tires() -> PacejkaParameters {
     PacejkaParameters::from_array([7.25, 1.5, 0.875, 0.25, 9.0, 1.375, 0.9375, -1e-7])
@@ -18,6 +19,11 @@ fn provenance() -> Provenance {
         vehicle_hash: "00ab".into(),
         seed: 7,
         command: "gripsight identify laps.mcap --seed 7\n--out DIR".into(),
+        status: Status::AcceptedWithin,
+        valid_within: ValidWithin {
+            slip_rad: PerAxle { front: 0.125, rear: 0.1 },
+            force_n: PerAxle { front: 12.5, rear: 14.25 },
+        },
         notes: vec!["the peak was not reached".into()],
     }
 }
@@ -27,6 +33,8 @@ const MPC: &str = "\
 # data: 2023-11-14T22:13:34.271Z, laps.mcap
 # vehicle hash 00ab, seed 7
 # command: gripsight identify laps.mcap --seed 7 --out DIR
+# status: accepted_within
+# valid within: slip_rad front 0.1250 rear 0.1000, force_n front 12.50 rear 14.25
 # note: the peak was not reached
 # F_y = friction_coeff * D * F_z * sin(C * atan(B*a - E*(B*a - atan(B*a)))), slip angle a in rad
 friction_coeff: 1.0
@@ -46,6 +54,8 @@ const CONTROLLER: &str = "\
 # data: 2023-11-14T22:13:34.271Z, laps.mcap
 # vehicle hash 00ab, seed 7
 # command: gripsight identify laps.mcap --seed 7 --out DIR
+# status: accepted_within
+# valid within: slip_rad front 0.1250 rear 0.1000, force_n front 12.50 rear 14.25
 # note: the peak was not reached
 C_Pf: [7.25, 1.5, 0.875, 0.25]
 C_Pr: [9.0, 1.375, 0.9375, -0.0000001]
@@ -66,6 +76,12 @@ fn the_files_are_as_their_readers_expect() {
 }
 
 /// PyYAML resolves YAML 1.1: a float needs a point, and an exponent a sign.
+#[test]
+fn limits_are_read_back() {
+    assert_eq!(read_valid_within(MPC), Some(provenance().valid_within));
+    assert_eq!(read_valid_within("friction_coeff: 1.0"), None);
+}
+
 #[test]
 fn a_yaml_1_1_reader_sees_floats() {
     let value = |line: &str| line.split_once(": ").map(|(_, v)| v.to_owned()).unwrap();
@@ -217,24 +233,27 @@ fn the_last_good_set_stays_and_a_rejected_one_never_replaces_it() {
     let folder = tempfile::tempdir().unwrap();
     let (car, first) = (VehicleParameters::f1tenth(), provenance());
     let worse = PacejkaParameters { front: tires().rear, ..tires() };
-    let write = |tires: &PacejkaParameters, provenance: &Provenance, accepted: bool| {
+    let write = |tires: &PacejkaParameters, provenance: &Provenance, status: Status| {
+        let provenance = &Provenance { status, ..provenance.clone() };
         let files = TireFiles { tires, vehicle: &car, provenance, floor: "default", driven_mps: 5.0 };
-        files.write(folder.path(), accepted).unwrap()
+        files.write(folder.path()).unwrap()
     };
     let mpc = || read_tires(&std::fs::read_to_string(folder.path().join("pacejka.yaml")).unwrap()).unwrap();
 
-    write(&tires(), &first, true);
-    write(&tires(), &first, true);
+    write(&tires(), &first, Status::AcceptedWithin);
+    write(&tires(), &first, Status::AcceptedWithin);
     let good = ["car_lookup_table.csv", "car_pacejka.txt", "pacejka.yaml"];
     assert_eq!(names(folder.path()), good);
 
-    write(&worse, &first, false);
+    write(&worse, &first, Status::Rejected);
+    write(&worse, &first, Status::Provisional);
+    assert!(names(folder.path()).contains(&"pacejka.provisional.yaml".to_owned()));
     let rejected = ["car_lookup_table.rejected.csv", "car_pacejka.rejected.txt", "pacejka.rejected.yaml"];
     assert!(rejected.iter().all(|name| names(folder.path()).contains(&(*name).to_owned())));
     assert_eq!(mpc(), tires());
 
     let later = Provenance { data_stamp_ns: first.data_stamp_ns + 3_600_000_000_000, ..provenance() };
-    write(&worse, &later, true);
+    write(&worse, &later, Status::Accepted);
     assert_eq!(mpc(), worse);
     let dated = [
         "car_lookup_table.20231114T221334Z.csv",
@@ -262,6 +281,6 @@ fn a_folder_that_cannot_be_written_is_named() {
         floor: "default",
         driven_mps: 5.0,
     };
-    let error = files.write(&file, true).unwrap_err().to_string();
+    let error = files.write(&file).unwrap_err().to_string();
     assert!(error.contains("file/"), "{error}");
 }

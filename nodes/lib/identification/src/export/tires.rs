@@ -5,8 +5,10 @@ use std::fmt::Write as _;
 use chrono::{DateTime, SecondsFormat};
 use gripsight_vehicle::{MagicFormula, PacejkaParameters, VehicleParameters};
 
+use crate::{PerAxle, Status, ValidWithin};
+
 /// Where a set of tires comes from: the comments at the head of each file.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Provenance {
     /// The car's name.
     pub car: String,
@@ -22,6 +24,10 @@ pub struct Provenance {
     pub seed: u64,
     /// The command that made it.
     pub command: String,
+    /// What the set may be used for: it says which files are written, too.
+    pub status: Status,
+    /// Slips and forces up to which it is valid.
+    pub valid_within: ValidWithin,
     /// Why the set was rejected, or what to know of an accepted one.
     pub notes: Vec<String>,
 }
@@ -34,6 +40,23 @@ pub fn stamp_text(stamp_ns: i64) -> String {
 
 /// Starts the comment that says how old the data is: [`super::TireFiles`] dates the sets it keeps by it.
 pub(super) const STAMP_COMMENT: &str = "# data: ";
+
+/// Starts the comment that says what the set may be used for.
+const STATUS_COMMENT: &str = "# status: ";
+/// Starts the comment that says up to where the set is valid.
+const VALID_COMMENT: &str = "# valid within: ";
+
+/// The limits that the comments of a tire file state; `None` where they state none.
+#[must_use]
+pub fn read_valid_within(text: &str) -> Option<ValidWithin> {
+    let line = text.lines().find_map(|line| line.strip_prefix(VALID_COMMENT))?;
+    let words = line.split([' ', ',']).filter_map(|word| word.parse().ok());
+    let [slip_front, slip_rear, force_front, force_rear] = words.collect::<Vec<f64>>().try_into().ok()?;
+    Some(ValidWithin {
+        slip_rad: PerAxle { front: slip_front, rear: slip_rear },
+        force_n: PerAxle { front: force_front, rear: force_rear },
+    })
+}
 
 impl Provenance {
     /// The data's stamp as RFC 3339 in UTC, milliseconds.
@@ -53,6 +76,17 @@ impl Provenance {
         line(STAMP_COMMENT, &format!("{}, {}", self.stamp(), self.bag));
         line("# ", &format!("vehicle hash {}, seed {}", self.vehicle_hash, self.seed));
         line("# ", &format!("command: {}", self.command));
+        line(STATUS_COMMENT, self.status.name());
+        let ValidWithin { slip_rad, force_n } = &self.valid_within;
+        if [slip_rad.front, slip_rad.rear, force_n.front, force_n.rear].iter().all(|v| v.is_finite()) {
+            line(
+                VALID_COMMENT,
+                &format!(
+                    "slip_rad front {:.4} rear {:.4}, force_n front {:.2} rear {:.2}",
+                    slip_rad.front, slip_rad.rear, force_n.front, force_n.rear
+                ),
+            );
+        }
         self.notes.iter().for_each(|note| line("# note: ", note));
         text
     }

@@ -18,11 +18,14 @@ fn after_a_change_of_grip_the_new_road_is_identified_and_accepted_though_its_pea
 
     let (_, changing, _) = on(Friction::Changing { mu: 0.7, mu_after: 0.9, at_s: 14.0, over_s: 0.1 }, 43);
     let next = identify(&changing, &vehicle, None, Some(&set), &config, &mut |_| {}).unwrap();
-    let grip = next.grip.unwrap();
+    let grip = next.grip.clone().unwrap();
     let since_s = (grip.since_ns - changing.start_stamp_ns) as f64 * 1e-9;
     assert!(grip.changed && (since_s - 14.0).abs() < 2.0, "{since_s} s: {grip:?}");
     assert!(next.accepted && next.reasons[0].starts_with("the grip has changed"), "{:?}", next.reasons);
-    let PerAxle { front, rear } = next.peak_friction;
+    // The new road's set promises what was shown on it; the old curves' shape says where its peak lies.
+    assert!(next.replaces(Some(&set)));
+    let provisional = next.provisional.unwrap_or_else(|| panic!("{:?}", next.reasons));
+    let PerAxle { front, rear } = provisional.peak_friction;
     for (now, before) in [(front.value, set.phi_p.front.d), (rear.value, set.phi_p.rear.d)] {
         approx::assert_relative_eq!(now / before, 0.9 / 0.7, max_relative = 0.08);
     }

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use gripsight_identification::{Config, FrictionPrior, Outcome, ResidualKind, identify};
+use gripsight_identification::{Config, FrictionPrior, Outcome, ResidualKind, Status, identify};
 use gripsight_signals::StateSequence;
 use gripsight_vehicle::VehicleParameters;
 
@@ -30,11 +30,13 @@ fn the_small_car_shows_its_plateau_and_gives_the_same_bytes_twice() {
             "{name} is on a bound and no reason says so"
         );
     }
-    // The plateau of the car is 0.45 to 0.5 g; the front tires limit it.
-    let front = outcome.phi_p.front.max_force_within(outcome.slip_range_rad.front.high);
-    assert!((0.4..0.6).contains(&front), "front plateau {front}");
+    // The plateau of the car is 0.45 to 0.5 g; the front tires limit it. The rear ones are driven to 14 degrees and still rise.
+    assert_eq!(outcome.status, Status::AcceptedWithin, "{:?}", outcome.reasons);
+    for axle in [outcome.phi_p.front, outcome.phi_p.rear] {
+        assert!((0.42..0.51).contains(&axle.d), "promised {axle:?}");
+    }
     let peak = &outcome.peak_friction.front;
-    assert!((0.4..0.6).contains(&peak.value), "{peak:?}");
+    assert!(peak.reached && (0.4..0.6).contains(&peak.value), "{peak:?}");
     // Motion capture sees a late command: 80 ms by its authors, servo and transport together.
     assert!((0.03..0.1).contains(&outcome.signals.steering_delay_s), "{:?}", outcome.signals);
     assert!(outcome.rmse.rollout.after < 0.6 * outcome.rmse.rollout.before);
@@ -46,7 +48,10 @@ fn the_small_car_shows_its_plateau_and_gives_the_same_bytes_twice() {
 fn the_indy_car_has_stiffness_but_no_peak() {
     let Some((sequence, vehicle)) = recorded("iac_putnam", f64::INFINITY) else { return };
     let alone = run(&sequence, &vehicle, None, ResidualKind::None);
-    assert!(!alone.accepted && !alone.peak_friction.front.reached && !alone.peak_friction.rear.reached);
+    // Usable for what was driven: half a g.
+    assert_eq!(alone.status, Status::AcceptedWithin, "{:?}", alone.reasons);
+    assert!(!alone.peak_friction.front.reached && !alone.peak_friction.rear.reached);
+    assert!(alone.phi_p.front.d < 0.55 && alone.phi_p.rear.d < 0.55, "{:?}", alone.phi_p);
     assert!(alone.reasons.iter().any(|r| r.contains("peak not reached")), "{:?}", alone.reasons);
     for stiffness in [alone.cornering_stiffness_n_per_rad.front, alone.cornering_stiffness_n_per_rad.rear] {
         assert!(stiffness.low > 0.0 && stiffness.low < stiffness.value && stiffness.value < stiffness.high);
@@ -57,16 +62,12 @@ fn the_indy_car_has_stiffness_but_no_peak() {
     assert!((signals.v_y_bias_mps.low..signals.v_y_bias_mps.high).contains(&0.15), "{signals:?}");
     assert!(alone.reasons.iter().any(|r| r.contains("later than a steering")), "{:?}", alone.reasons);
     let with_prior = run(&sequence, &vehicle, Some(1.0), ResidualKind::None);
-    // A prior for the peak does not mend what a lag of 0.3 s does to the stiffnesses.
-    assert!(!with_prior.accepted, "{:?}", with_prior.reasons);
-    assert!(
-        with_prior.reasons.iter().any(|r| r.contains("later than a steering")),
-        "{:?}",
-        with_prior.reasons
-    );
+    // A prior adds a set and changes nothing of what the data alone say.
+    assert_eq!((alone.phi_p, alone.status), (with_prior.phi_p, with_prior.status));
+    let provisional = with_prior.provisional.unwrap();
     for (peak, d) in [
-        (with_prior.peak_friction.front, with_prior.phi_p.front.d),
-        (with_prior.peak_friction.rear, with_prior.phi_p.rear.d),
+        (provisional.peak_friction.front, provisional.phi_p.front.d),
+        (provisional.peak_friction.rear, provisional.phi_p.rear.d),
     ] {
         assert!(peak.from_prior && !peak.reached);
         // A soft bound: D is the prior's within what lies between a road and an axle.
@@ -80,15 +81,16 @@ fn a_prior_that_contradicts_the_small_cars_plateau_is_not_believed() {
     let Some((sequence, vehicle)) = recorded("rc10_mocap", 60.0) else { return };
     // The plateau is at 0.45 to 0.5.
     let outcome = run(&sequence, &vehicle, Some(1.0), ResidualKind::None);
-    assert!(!outcome.accepted, "{:?}", outcome.reasons);
+    assert!(outcome.provisional.is_none(), "{:?}", outcome.provisional);
     assert!(outcome.reasons.iter().any(|r| r.contains("contradicts")), "{:?}", outcome.reasons);
+    assert!(outcome.accepted && outcome.phi_p.front.d < 0.51, "{:?} {:?}", outcome.phi_p, outcome.reasons);
 }
 
 #[test]
 fn no_part_of_the_indy_cars_laps_shows_a_peak() {
     let Some((sequence, vehicle)) = recorded("iac_putnam", 60.0) else { return };
     let outcome = run(&sequence, &vehicle, None, ResidualKind::None);
-    assert!(!outcome.accepted && !outcome.peak_friction.front.reached && !outcome.peak_friction.rear.reached);
+    assert!(!outcome.peak_friction.front.reached && !outcome.peak_friction.rear.reached);
     for stiffness in [outcome.cornering_stiffness_n_per_rad.front, outcome.cornering_stiffness_n_per_rad.rear]
     {
         assert!(stiffness.low < stiffness.value && stiffness.value < stiffness.high, "{stiffness:?}");
@@ -106,19 +108,19 @@ fn a_poor_v_y_is_named() {
 }
 
 #[test]
-fn a_prior_counts_within_its_sigma_of_what_the_drive_shows_and_not_far_from_it() {
+fn a_prior_makes_a_set_beside_the_one_that_the_drive_shows() {
     // The front tires stay just below their peak, D = 1.02.
     let (sequence, vehicle) = demo("demo_race_car");
-    let with = |mu: f64| run(&sequence, &vehicle, Some(mu), ResidualKind::None);
-    for mu in [0.95, 1.0, 1.1] {
-        let outcome = with(mu);
-        let front = outcome.peak_friction.front;
-        assert!(outcome.accepted && front.from_prior, "{mu}: {:?}", outcome.reasons);
-        assert!((front.value - 1.02).abs() < 0.1, "{mu}: {front:?}");
-    }
-    for mu in [0.7, 1.6] {
-        let Outcome { accepted, reasons, .. } = with(mu);
-        let front = &reasons[0];
-        assert!(!accepted && front.starts_with("front peak") && front.contains("prior"), "{mu}: {reasons:?}");
+    let with = |mu: Option<f64>| run(&sequence, &vehicle, mu, ResidualKind::None);
+    let alone = with(None);
+    assert!(alone.accepted && alone.provisional.is_none(), "{:?}", alone.reasons);
+    for mu in [0.7, 0.95, 1.0, 1.1, 1.6] {
+        let outcome = with(Some(mu));
+        assert_eq!((outcome.phi_p, outcome.status), (alone.phi_p, alone.status), "{mu}");
+        // What was shown is a lower bound.
+        if let Some(set) = outcome.provisional {
+            let shown = alone.found.front.max_force_within(outcome.slip_range_rad.front.high);
+            assert!(set.phi_p.front.d > 0.97 * shown, "{mu}: {set:?}, shown {shown}");
+        }
     }
 }

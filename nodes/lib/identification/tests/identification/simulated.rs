@@ -33,7 +33,7 @@ fn errors(tires: &PacejkaParameters, recording: &Recording, vehicle: &VehiclePar
 fn finds_the_forces_of_a_car_with_all_the_background_effects() {
     let (recording, sequence, vehicle) = drive(with_background(scenario("f1tenth", "club", 0.9, 0.9, 3)));
     let outcome = identify(&sequence, &vehicle, None, None, &quick(), &mut |_| {}).unwrap();
-    let error = errors(&outcome.phi_p, &recording, &vehicle);
+    let error = errors(&outcome.found, &recording, &vehicle);
     // The paper's S4 has 0.051 and 0.033.
     assert!(error.front < 0.051 && error.rear < 0.051, "{error:?} {:?}", outcome.reasons);
 }

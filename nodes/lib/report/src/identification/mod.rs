@@ -3,7 +3,7 @@
 mod pictures;
 mod tables;
 
-use gripsight_identification::{Method, Outcome, PerAxle, Source};
+use gripsight_identification::{Method, Outcome, PerAxle, Source, Status};
 use maud::html;
 
 use crate::page::{Tone, figure, list, page, section};
@@ -37,7 +37,11 @@ pub fn identification_page(input: &IdentificationInput<'_>) -> Result<String, Re
         significant(outcome.rmse.horizon_s, 2)
     );
     let fitted = outcome.source != Source::Start;
-    let tires = if fitted { "Tires found" } else { "Tires that the run started from" };
+    let tires = match outcome.status {
+        _ if !fitted => "Tires that the run started from",
+        Status::Accepted | Status::AcceptedWithin => "Tires to use",
+        Status::Provisional | Status::Rejected => "Tires found",
+    };
     let drawn = !outcome.trace.time_s.is_empty();
     let body = html! {
         @if drawn {
@@ -78,10 +82,22 @@ pub fn identification_page(input: &IdentificationInput<'_>) -> Result<String, Re
 
 /// The first line: use it or not, and the two figures that matter.
 fn verdict(outcome: &Outcome) -> String {
-    let start = match outcome.reasons.first() {
-        _ if outcome.accepted => "Accepted".to_owned(),
-        Some(reason) => format!("Not accepted: {reason}"),
-        None => "Not accepted".to_owned(),
+    let valid = &outcome.valid_within;
+    let start = match (outcome.status, outcome.reasons.first()) {
+        (Status::Accepted, _) => "Accepted".to_owned(),
+        (Status::AcceptedWithin, _) => format!(
+            "Accepted within the slips driven, {}° front and {}° rear, and the forces shown, {} and {} N",
+            significant(valid.slip_rad.front.to_degrees(), 3),
+            significant(valid.slip_rad.rear.to_degrees(), 3),
+            significant(valid.force_n.front, 3),
+            significant(valid.force_n.rear, 3)
+        ),
+        (Status::Provisional, Some(reason)) => {
+            format!("Provisional, the peak rests on a prior: {reason}")
+        }
+        (Status::Provisional, None) => "Provisional, the peak rests on a prior".to_owned(),
+        (Status::Rejected, Some(reason)) => format!("Not accepted: {reason}"),
+        (Status::Rejected, None) => "Not accepted".to_owned(),
     };
     let stiffness = outcome.cornering_stiffness_n_per_rad;
     let stiffness = stiffness.map(|k| significant(k.value, 3));

@@ -1,6 +1,7 @@
 //! The pictures of an identification.
 
-use gripsight_identification::{Change, HorizonError, Outcome, PeakFriction, Range, TireCurve, Trace};
+use gripsight_identification::{Change, HorizonError, Outcome, Range, TireCurve, Trace};
+use gripsight_vehicle::MagicFormula;
 
 use super::IdentificationInput;
 use crate::{Axis, Chart, Layer, Role};
@@ -22,7 +23,7 @@ pub(super) fn tire_curves(input: &IdentificationInput<'_>) -> [Chart; 2] {
             "front tires",
             &o.curves.front,
             &o.slip_range_rad.front,
-            &o.peak_friction.front,
+            &o.phi_p.front,
             truth.map(|t| t.front.as_slice()),
         ),
         tire_curve(
@@ -30,7 +31,7 @@ pub(super) fn tire_curves(input: &IdentificationInput<'_>) -> [Chart; 2] {
             "rear tires",
             &o.curves.rear,
             &o.slip_range_rad.rear,
-            &o.peak_friction.rear,
+            &o.phi_p.rear,
             truth.map(|t| t.rear.as_slice()),
         ),
     ]
@@ -41,7 +42,7 @@ fn tire_curve(
     title: &str,
     curve: &TireCurve,
     range: &Range,
-    peak: &PeakFriction,
+    set: &MagicFormula,
     truth: Option<&[(f64, f64)]>,
 ) -> Chart {
     let last_deg = curve.slip_rad.last().map_or(1.0, |s| s.to_degrees());
@@ -72,6 +73,7 @@ fn tire_curve(
         .filter(|p| p.0.to_degrees() <= end_deg)
         .map(|p| p.1)
         .fold(top, f64::max);
+    let promised: Vec<f64> = curve.slip_rad.iter().map(|&slip| set.normalized_force(slip)).collect();
     let mut chart = Chart::new(
         title,
         Axis::new("slip angle / °").with_range(0.0, end_deg),
@@ -81,15 +83,14 @@ fn tire_curve(
     .with(Layer::Density { name: "samples".into(), bins })
     .with(Layer::Band { role: Role::Identified, name: "90 %".into(), points: band });
     if let Some(prior) = outcome.prior {
-        let name = if peak.from_prior { "prior (a soft bound on D)" } else { "prior" };
-        chart = chart.with(Layer::Level { role: Role::Prior, name: name.into(), y: prior.mu });
+        chart = chart.with(Layer::Level { role: Role::Prior, name: "prior".into(), y: prior.mu });
     }
     chart = chart
         .with(Layer::Line { role: Role::Nominal, name: "start".into(), points: over(&curve.initial) })
         .with(Layer::Line {
             role: Role::Identified,
-            name: "identified".into(),
-            points: over(&curve.identified),
+            name: if outcome.accepted { "to use" } else { "identified" }.into(),
+            points: over(&if outcome.accepted { promised } else { curve.identified.clone() }),
         });
     if let Some(truth) = truth {
         let points = truth.iter().map(|&(s, f)| (s.to_degrees(), f)).collect();

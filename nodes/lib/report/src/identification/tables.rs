@@ -1,6 +1,6 @@
 //! The tables of an identification.
 
-use gripsight_identification::{Outcome, Range};
+use gripsight_identification::{Outcome, PeakFriction, PerAxle, Range};
 use maud::{Markup, html};
 
 use crate::health::health;
@@ -19,6 +19,11 @@ pub(super) fn tires(outcome: &Outcome) -> Markup {
     };
     let slip = |r: &Range| format!("{}°", interval(r.low.to_degrees(), r.high.to_degrees()));
     let stiffness = &outcome.cornering_stiffness_n_per_rad;
+    let valid = &outcome.valid_within;
+    let degrees = |slip_rad: f64| format!("{}°", significant(slip_rad.to_degrees(), 3));
+    let provisional = |axle: fn(&PerAxle<PeakFriction>) -> PeakFriction| {
+        outcome.provisional.as_ref().map_or_else(|| "–".to_owned(), |p| peak_friction(&axle(&p.peak_friction)))
+    };
     table(
         ["", "Front", "Rear"],
         &[
@@ -28,7 +33,14 @@ pub(super) fn tires(outcome: &Outcome) -> Markup {
                 peak_friction(&outcome.peak_friction.front),
                 peak_friction(&outcome.peak_friction.rear),
             ],
+            [
+                "Peak friction with the prior, provisional".into(),
+                provisional(|p| p.front),
+                provisional(|p| p.rear),
+            ],
             ["Slip visited".into(), slip(&outcome.slip_range_rad.front), slip(&outcome.slip_range_rad.rear)],
+            ["Valid up to a slip of".into(), degrees(valid.slip_rad.front), degrees(valid.slip_rad.rear)],
+            ["Force promised at most / N".into(), significant(valid.force_n.front, 3), significant(valid.force_n.rear, 3)],
             letter("B / (1/rad)", "b", f.b, r.b),
             letter("C", "c", f.c, r.c),
             letter("D", "d", f.d, r.d),

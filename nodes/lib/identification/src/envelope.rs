@@ -1,0 +1,200 @@
+//! What a drive has shown of the tires, and the set that promises no more than that.
+//!
+//! ```text
+//! F(a)      F_y/F_z of the curve found, with the half-width h(a) of its 90 % interval, over the slips driven, 0 < a <= a_max
+//! shown     s(a) = F(a) - h(a);  F(a) - max(0, h(a) - TOLERANCE max F) where both peaks are known
+//! cap       the smaller of both axles' max s and of the lateral acceleration that was measured, over g
+//! set       the Magic Formula nearest below min(s(a), cap), with D = cap and a stiffness within its interval
+//! ```
+//!
+//! In a steady turn both axles carry the same F_y/F_z = a_y/g: one cap for both, so that it invents no understeer and no oversteer. Where both
+//! peaks are known each axle keeps its own, and curves known to the tolerance are handed on as they were found. The worse a curve is known, the lower
+//! the promise.
+
+mod band;
+
+use gripsight_signals::Segment;
+use gripsight_vehicle::{GRAVITY_MPS2, MagicFormula, PacejkaParameters, VehicleParameters};
+use serde::{Deserialize, Serialize};
+
+use crate::data::{Data, quantile};
+use crate::nelder_mead::{NelderMeadConfig, minimize};
+use crate::tires::{C_BOUNDS, C_PRIOR, E_BOUNDS, E_PRIOR};
+use crate::{Estimate, Identification, IdentificationError, PerAxle};
+
+pub(crate) use band::{Band, half_width};
+
+/// Where both peaks are known a promise may lie above the truth by this share of the largest force, in 95 of 100 cases: half of what is counted as a
+/// promise too high.
+const TOLERANCE: f64 = 0.05;
+/// How much more a promise above what was shown counts than one below.
+const ABOVE: f64 = 100.0;
+/// How much the set may miss what was shown to keep stiffness and shape one width nearer to what was found or is likely: their ridge is flat.
+const SHAPE_TRUST: f64 = 3e-3;
+/// Lateral acceleration counts as shown when a car holds it this long,
+const HELD_S: f64 = 0.2;
+/// in this share of the time driven.
+const HELD_SHARE: f64 = 0.005;
+
+/// Slips and forces up to which a set is valid.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ValidWithin {
+    /// Largest slip angle, rad.
+    pub slip_rad: PerAxle<f64>,
+    /// Largest lateral force at the static load, N.
+    pub force_n: PerAxle<f64>,
+}
+
+impl ValidWithin {
+    /// Of a set that is valid nowhere.
+    pub const NOWHERE: Self = Self {
+        slip_rad: PerAxle { front: f64::NAN, rear: f64::NAN },
+        force_n: PerAxle { front: f64::NAN, rear: f64::NAN },
+    };
+}
+
+/// What was shown, and the set within it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Envelope {
+    pub(crate) tires: PacejkaParameters,
+    pub(crate) valid_within: ValidWithin,
+    /// Largest upper over lower end of the curve's interval within the slips driven.
+    pub(crate) factor: PerAxle<f64>,
+}
+
+/// What is known of an axle.
+struct Axle<'a> {
+    found: &'a MagicFormula,
+    band: &'a Band,
+    /// Interval of the normalised stiffness, 1/rad.
+    stiffness: (f64, f64),
+}
+
+impl Envelope {
+    /// Around the tires that a run has found.
+    pub(crate) fn of(
+        run: &Identification,
+        found: &PacejkaParameters,
+        stiffness: &PerAxle<Estimate>,
+    ) -> Result<Self, IdentificationError> {
+        let bands = PerAxle {
+            front: Band::new(run, &found.front, &run.direct.tires.front, 0),
+            rear: Band::new(run, &found.rear, &run.direct.tires.rear, 4),
+        };
+        let vehicle = &run.vehicle;
+        let loads_n = PerAxle { front: vehicle.static_load_front_n(), rear: vehicle.static_load_rear_n() };
+        let interval = |k: &Estimate, load_n: f64| (k.low / load_n, k.high / load_n);
+        let front = Axle {
+            found: &found.front,
+            band: &bands.front,
+            stiffness: interval(&stiffness.front, loads_n.front),
+        };
+        let rear = Axle {
+            found: &found.rear,
+            band: &bands.rear,
+            stiffness: interval(&stiffness.rear, loads_n.rear),
+        };
+        let reached = run.direct.peak.front.reached && run.direct.peak.rear.reached;
+        let tolerance = if reached { TOLERANCE } else { 0.0 };
+        let mut caps = [front.band.shown(tolerance), rear.band.shown(tolerance)].map(|shown| highest(&shown));
+        if !reached {
+            caps = [caps[0].min(caps[1]).min(held_lateral_g(&run.data)); 2];
+        }
+        let tires = PacejkaParameters { front: front.within(caps[0], tolerance)?, rear: rear.within(caps[1], tolerance)? };
+        let tires = stabilized(vehicle, tires, front.stiffness.0, run.top_speed_mps());
+        let force_n = |axle: &MagicFormula, slip_rad: f64, load_n: f64| axle.max_force_within(slip_rad) * load_n;
+        let slip_rad = PerAxle { front: bands.front.furthest_rad(), rear: bands.rear.furthest_rad() };
+        Ok(Self {
+            tires,
+            valid_within: ValidWithin {
+                slip_rad,
+                force_n: PerAxle {
+                    front: force_n(&tires.front, slip_rad.front, loads_n.front),
+                    rear: force_n(&tires.rear, slip_rad.rear, loads_n.rear),
+                },
+            },
+            factor: PerAxle { front: bands.front.factor(), rear: bands.rear.factor() },
+        })
+    }
+}
+
+impl Axle<'_> {
+    /// The Magic Formula within what was shown, D at the cap. What is known to the tolerance, peak included, stays as it was found.
+    fn within(&self, cap: f64, tolerance: f64) -> Result<MagicFormula, IdentificationError> {
+        let shown = self.band.shown(tolerance);
+        if shown == self.band.force && cap == highest(&shown) {
+            return Ok(*self.found);
+        }
+        let target: Vec<f64> = shown.iter().map(|s| s.min(cap)).collect();
+        let found = self.found.normalized_stiffness();
+        let (low, high) = (self.stiffness.0.min(found).max(0.1 * found), self.stiffness.1.max(found));
+        let axle = |x: &[f64]| MagicFormula::from_stiffness(x[0], x[1], cap, x[2]);
+        let width = (high - low).max(1e-3 * found);
+        let cost = |x: &[f64]| {
+            let axle = axle(x);
+            let misses = self.band.slip_rad.iter().zip(&target).map(|(&slip, target)| {
+                let miss = (axle.normalized_force(slip) - target) / cap;
+                miss * miss * if miss > 0.0 { ABOVE } else { 1.0 }
+            });
+            let shape = ((x[0] - found) / width).powi(2)
+                + ((x[1] - C_PRIOR.mean) / C_PRIOR.sigma).powi(2)
+                + ((x[2] - E_PRIOR.mean) / E_PRIOR.sigma).powi(2);
+            misses.sum::<f64>() / target.len() as f64 + SHAPE_TRUST.powi(2) * shape
+        };
+        let bounds = [(low, high), C_BOUNDS, E_BOUNDS];
+        let config = NelderMeadConfig { tolerance_x: 1e-4, tolerance_cost: 1e-9, ..NelderMeadConfig::default() };
+        let mut best: Option<crate::nelder_mead::Minimum> = None;
+        for (c, e) in [(self.found.c, self.found.e), (C_PRIOR.mean, E_PRIOR.mean), (C_BOUNDS.0, -3.0)] {
+            let start = [found, c.clamp(C_BOUNDS.0, C_BOUNDS.1), e.clamp(E_BOUNDS.0, E_BOUNDS.1)];
+            let ended = minimize(cost, &start, &bounds, &config)?;
+            if best.as_ref().is_none_or(|b| ended.cost < b.cost) {
+                best = Some(ended);
+            }
+        }
+        Ok(best.map_or(*self.found, |b| axle(&b.x)))
+    }
+}
+
+/// A front axle as much softer, within its interval, as it takes to run straight at a speed: the end of the interval where nothing does.
+fn stabilized(
+    vehicle: &VehicleParameters,
+    tires: PacejkaParameters,
+    softest: f64,
+    v_x_mps: f64,
+) -> PacejkaParameters {
+    const STEPS: u32 = 10;
+    let (front, stiffness) = (tires.front, tires.front.normalized_stiffness());
+    let softest = softest.min(stiffness).max(0.1 * stiffness);
+    let softer = (0..=STEPS).map(|step| {
+        let k = stiffness + (softest - stiffness) * f64::from(step) / f64::from(STEPS);
+        PacejkaParameters { front: MagicFormula::from_stiffness(k, front.c, front.d, front.e), rear: tires.rear }
+    });
+    let stable = |tires: &PacejkaParameters| {
+        gripsight_vehicle::handling::straight_line_growth_rate_1ps(vehicle, tires, v_x_mps) <= 0.0
+    };
+    softer.into_iter().find(stable).unwrap_or(tires)
+}
+
+/// The lateral acceleration over g that the car held, from yaw rate and speeds alone: no tire has a say in it.
+fn held_lateral_g(data: &Data) -> f64 {
+    let held = ((HELD_S / data.dt_s).round() as usize).max(2);
+    let mean = |s: &Segment, from: usize| {
+        let turned: f64 = (from..from + held).map(|k| s.v_x_mps[k] * s.yaw_rate_radps[k]).sum::<f64>() / held as f64;
+        let slid = (s.v_y_mps[from + held - 1] - s.v_y_mps[from]) / ((held - 1) as f64 * s.dt_s);
+        (turned + slid).abs() / GRAVITY_MPS2
+    };
+    let step = (held / 4).max(1);
+    let mut all: Vec<f64> = data
+        .stretches
+        .iter()
+        .flat_map(|s| {
+            let segment = &data.segments[s.segment];
+            (s.from..(s.from + s.len + 1).saturating_sub(held)).step_by(step).map(move |from| mean(segment, from))
+        })
+        .collect();
+    quantile(&mut all, 1.0 - HELD_SHARE).unwrap_or(f64::NAN)
+}
+
+fn highest(values: &[f64]) -> f64 {
+    values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+}
