@@ -12,7 +12,8 @@ use gripsight_identification_messages as messages;
 use gripsight_msgs::standard::ackermann_msgs::AckermannDriveStamped;
 use gripsight_msgs::standard::nav_msgs::Odometry;
 use gripsight_msgs::{
-    FrictionPrior as FrictionMessage, PacejkaParams, ResidualModel as ModelMessage, StateSequence as SequenceMessage,
+    FrictionPrior as FrictionMessage, PacejkaParams, ResidualModel as ModelMessage,
+    StateSequence as SequenceMessage,
 };
 use gripsight_runtime::{Descriptor, Diagnostics, Node, Parameter, Qos, Subscription, vehicle_parameters};
 use gripsight_signals::{Measurement, StateSequence};
@@ -232,7 +233,8 @@ async fn identify_each(
             if let Some(notice) = &notice {
                 tracing::warn!("sequence {}: {notice}", sequence.sequence_id);
             }
-            hand_on(outcome, message, notice.clone(), settings.publish_provisional.get(), in_force, outputs).await;
+            hand_on(outcome, message, notice.clone(), settings.publish_provisional.get(), in_force, outputs)
+                .await;
             facts.borrow_mut().grip = notice;
             write_files(outcome, &sequence, settings);
         }

@@ -65,7 +65,8 @@ impl Run<'_> {
             Started::Running(run) => self.turns(run).await?,
             Started::Refused(outcome) => *outcome,
         };
-        self.step(&outcome.key, Progress::FINISHED, outcome.history.last(), outcome.status.name().to_owned()).await;
+        self.step(&outcome.key, Progress::FINISHED, outcome.history.last(), outcome.status.name().to_owned())
+            .await;
         Ok(outcome)
     }
 

@@ -103,7 +103,11 @@ fn parts(peer: &Process) -> Vec<StateSequence> {
 
 fn accepted(peer: &Process) -> PacejkaParams {
     let set: PacejkaParams = serde_json::from_str(&peer.line(RUN)).unwrap();
-    assert!([PacejkaParams::ACCEPTED, PacejkaParams::ACCEPTED_WITHIN].contains(&set.status), "{}", set.reason);
+    assert!(
+        [PacejkaParams::ACCEPTED, PacejkaParams::ACCEPTED_WITHIN].contains(&set.status),
+        "{}",
+        set.reason
+    );
     set
 }
 

@@ -82,7 +82,11 @@ fn tires(text: &mut String, result: &Outcome) {
         ("peak friction", peak_friction(&d.front), peak_friction(&d.rear)),
         ("cornering stiffness N/rad", estimate(&k.front), estimate(&k.rear)),
         ("slip visited deg", slip(&s.front), slip(&s.rear)),
-        ("valid to slip deg", valid(&|v| v.slip_rad.front.to_degrees()), valid(&|v| v.slip_rad.rear.to_degrees())),
+        (
+            "valid to slip deg",
+            valid(&|v| v.slip_rad.front.to_degrees()),
+            valid(&|v| v.slip_rad.rear.to_degrees()),
+        ),
         ("valid to force N", valid(&|v| v.force_n.front), valid(&|v| v.force_n.rear)),
         ("B  C  D  E", letters(&result.phi_p.front), letters(&result.phi_p.rear)),
     ];

@@ -52,8 +52,7 @@ pub(crate) fn judge(run: &Identification, envelope: &Envelope, outcome: &mut Out
         (Status::Provisional, Some(set)) => (set.phi_p, ValidWithin::NOWHERE),
         _ => (outcome.found, ValidWithin::NOWHERE),
     };
-    outcome.reasons =
-        verdict.against.into_iter().chain(verdict.unknown).chain(verdict.remarks).collect();
+    outcome.reasons = verdict.against.into_iter().chain(verdict.unknown).chain(verdict.remarks).collect();
     outcome.drive_next = verdict.drive;
 }
 
@@ -127,10 +126,9 @@ fn stability(run: &Identification, envelope: &Envelope, outcome: &Outcome, verdi
 /// Curves that are not known well enough to steer by.
 fn forces(envelope: &Envelope, outcome: &Outcome, verdict: &mut Verdict) {
     let stiffness = &outcome.cornering_stiffness_n_per_rad;
-    for (axle, k, factor) in [
-        ("front", stiffness.front, envelope.factor.front),
-        ("rear", stiffness.rear, envelope.factor.rear),
-    ] {
+    for (axle, k, factor) in
+        [("front", stiffness.front, envelope.factor.front), ("rear", stiffness.rear, envelope.factor.rear)]
+    {
         let stiff = k.high / k.low;
         if stiff.is_nan() || stiff > KNOWN_WITHIN {
             verdict.against.push(format!(
@@ -212,12 +210,20 @@ fn peaks(run: &Identification, outcome: &Outcome, verdict: &mut Verdict) {
         remarks.push(match run.prior {
             None => what,
             Some(prior) if shown.contradicts_prior => {
-                format!("{what}; the friction prior of {:.2} contradicts the data, which fit far worse with it", prior.mu)
+                format!(
+                    "{what}; the friction prior of {:.2} contradicts the data, which fit far worse with it",
+                    prior.mu
+                )
             }
             Some(prior) if !shown.is_the_priors(prior) => {
-                format!("{what}; the friction prior of {:.2} is below the force that these tires showed", prior.mu)
+                format!(
+                    "{what}; the friction prior of {:.2} is below the force that these tires showed",
+                    prior.mu
+                )
             }
-            Some(prior) => format!("{what}; the provisional set rests on the friction prior of {:.2}", prior.mu),
+            Some(prior) => {
+                format!("{what}; the provisional set rests on the friction prior of {:.2}", prior.mu)
+            }
         });
         drive.push(format!(
             "corner harder until the {axle} tires slide (more than {furthest:.1} degrees of slip)"

@@ -302,8 +302,8 @@ impl Fitter<'_> {
         if ![peak.front, peak.rear].iter().any(|axle| axle.is_the_priors(prior)) {
             return Ok(None);
         }
-        let [held, likely] =
-            with_prior(all, found, peak, prior).map(|all| self.solve(&all, &self.training, &weights.sigma, 30));
+        let [held, likely] = with_prior(all, found, peak, prior)
+            .map(|all| self.solve(&all, &self.training, &weights.sigma, 30));
         let with_it = if likely.linearization.cost < held.linearization.cost { likely } else { held };
         if contradicts(prior, peak, found, &with_it) {
             peak.front.contradicts_prior = true;

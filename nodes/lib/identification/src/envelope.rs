@@ -100,9 +100,13 @@ impl Envelope {
         if !reached {
             caps = [caps[0].min(caps[1]).min(held_lateral_g(&run.data)); 2];
         }
-        let tires = PacejkaParameters { front: front.within(caps[0], tolerance)?, rear: rear.within(caps[1], tolerance)? };
+        let tires = PacejkaParameters {
+            front: front.within(caps[0], tolerance)?,
+            rear: rear.within(caps[1], tolerance)?,
+        };
         let tires = stabilized(vehicle, tires, front.stiffness.0, run.top_speed_mps());
-        let force_n = |axle: &MagicFormula, slip_rad: f64, load_n: f64| axle.max_force_within(slip_rad) * load_n;
+        let force_n =
+            |axle: &MagicFormula, slip_rad: f64, load_n: f64| axle.max_force_within(slip_rad) * load_n;
         let slip_rad = PerAxle { front: bands.front.furthest_rad(), rear: bands.rear.furthest_rad() };
         Ok(Self {
             tires,
@@ -142,7 +146,8 @@ impl Axle<'_> {
             misses.sum::<f64>() / target.len() as f64 + SHAPE_TRUST.powi(2) * shape
         };
         let bounds = [(low, high), C_BOUNDS, E_BOUNDS];
-        let config = NelderMeadConfig { tolerance_x: 1e-4, tolerance_cost: 1e-9, ..NelderMeadConfig::default() };
+        let config =
+            NelderMeadConfig { tolerance_x: 1e-4, tolerance_cost: 1e-9, ..NelderMeadConfig::default() };
         let mut best: Option<crate::nelder_mead::Minimum> = None;
         for (c, e) in [(self.found.c, self.found.e), (C_PRIOR.mean, E_PRIOR.mean), (C_BOUNDS.0, -3.0)] {
             let start = [found, c.clamp(C_BOUNDS.0, C_BOUNDS.1), e.clamp(E_BOUNDS.0, E_BOUNDS.1)];
@@ -167,7 +172,10 @@ fn stabilized(
     let softest = softest.min(stiffness).max(0.1 * stiffness);
     let softer = (0..=STEPS).map(|step| {
         let k = stiffness + (softest - stiffness) * f64::from(step) / f64::from(STEPS);
-        PacejkaParameters { front: MagicFormula::from_stiffness(k, front.c, front.d, front.e), rear: tires.rear }
+        PacejkaParameters {
+            front: MagicFormula::from_stiffness(k, front.c, front.d, front.e),
+            rear: tires.rear,
+        }
     });
     let stable = |tires: &PacejkaParameters| {
         gripsight_vehicle::handling::straight_line_growth_rate_1ps(vehicle, tires, v_x_mps) <= 0.0
@@ -179,7 +187,8 @@ fn stabilized(
 fn held_lateral_g(data: &Data) -> f64 {
     let held = ((HELD_S / data.dt_s).round() as usize).max(2);
     let mean = |s: &Segment, from: usize| {
-        let turned: f64 = (from..from + held).map(|k| s.v_x_mps[k] * s.yaw_rate_radps[k]).sum::<f64>() / held as f64;
+        let turned: f64 =
+            (from..from + held).map(|k| s.v_x_mps[k] * s.yaw_rate_radps[k]).sum::<f64>() / held as f64;
         let slid = (s.v_y_mps[from + held - 1] - s.v_y_mps[from]) / ((held - 1) as f64 * s.dt_s);
         (turned + slid).abs() / GRAVITY_MPS2
     };
@@ -189,7 +198,9 @@ fn held_lateral_g(data: &Data) -> f64 {
         .iter()
         .flat_map(|s| {
             let segment = &data.segments[s.segment];
-            (s.from..(s.from + s.len + 1).saturating_sub(held)).step_by(step).map(move |from| mean(segment, from))
+            (s.from..(s.from + s.len + 1).saturating_sub(held))
+                .step_by(step)
+                .map(move |from| mean(segment, from))
         })
         .collect();
     quantile(&mut all, 1.0 - HELD_SHARE).unwrap_or(f64::NAN)

@@ -154,7 +154,6 @@ impl LiveResidual {
             extrapolated: !(hull.front.contains(front) && hull.rear.contains(rear)),
         }
     }
-
 }
 
 /// Takes what identification found of the signals out of samples, in the order of their stamps.

@@ -332,7 +332,6 @@ impl Outcome {
         self.accepted && (changed || !keeps && shown(&self.phi_p) >= NO_LESS * shown(&set.promised))
     }
 
-
     /// What later runs start from and the monitor watches; `None` where the set was not accepted.
     #[must_use]
     pub fn accepted_set(&self) -> Option<AcceptedSet> {

@@ -7,8 +7,8 @@ use std::f64::consts::TAU;
 
 use gripsight_identification::{
     Change, Config, Estimate, FrictionPrior, HorizonError, IterationRecord, Nuisance, Outcome, PeakFriction,
-    PerAxle, ProvisionalSet, Range, Rmse, RmseReport, RunKey, SignalCorrections, SignalEstimates, Source, Status,
-    TireCurve, Trace, ValidWithin, WeakSignal,
+    PerAxle, ProvisionalSet, Range, Rmse, RmseReport, RunKey, SignalCorrections, SignalEstimates, Source,
+    Status, TireCurve, Trace, ValidWithin, WeakSignal,
 };
 use gripsight_report::{Header, IdentificationInput, identification_page};
 use gripsight_signals::DataHealth;

@@ -71,8 +71,7 @@ fn axle(outcome: &Outcome, known: &Known, front: bool) -> Result<Vec<f64>> {
     let within = if valid_rad.is_finite() { valid_rad } else { driven_rad };
     let stiffness = &outcome.cornering_stiffness_n_per_rad;
     let k = if front { stiffness.front } else { stiffness.rear };
-    let load_n =
-        of(outcome.vehicle.static_load_front_n(), outcome.vehicle.static_load_rear_n());
+    let load_n = of(outcome.vehicle.static_load_front_n(), outcome.vehicle.static_load_rear_n());
     let mut row = vec![f64::NAN; 18];
     let truth = known.truth.as_ref().map(floor).transpose()?.map(|(truth, _)| truth);
     if let Some(truth) = &truth {
@@ -107,12 +106,20 @@ fn axle(outcome: &Outcome, known: &Known, front: bool) -> Result<Vec<f64>> {
 }
 
 /// Identifies a run and sets what it promises beside the truth.
-fn row(run: &Run, known: &PerAxle<Known>, mu: f64, pace: f64, prior: Option<FrictionPrior>) -> Result<String> {
+fn row(
+    run: &Run,
+    known: &PerAxle<Known>,
+    mu: f64,
+    pace: f64,
+    prior: Option<FrictionPrior>,
+) -> Result<String> {
     let config = Config { residual: ResidualKind::None, ..Config::default() };
     let begin = Instant::now();
     let outcome = match identify(&run.sequence, &run.vehicle, prior, None, &config, &mut |_| {}) {
         Ok(outcome) => outcome,
-        Err(error) => return Ok(format!("{},{mu},{pace},,,failed,,,{},\"{error}\"", run.name, ",".repeat(35))),
+        Err(error) => {
+            return Ok(format!("{},{mu},{pace},,,failed,,,{},\"{error}\"", run.name, ",".repeat(35)));
+        }
     };
     let seconds = begin.elapsed().as_secs_f64();
     let mut cells = vec![run.name.clone()];
@@ -163,7 +170,8 @@ fn drawn(seed: u64, duration_s: f64) -> Result<(Run, PerAxle<Known>, f64, f64)> 
         plateau_rad: Some(plateau_rad(tire, mu)),
         peak: Some(mu * tire.grip),
     };
-    let known = PerAxle { front: known(&truth.front, &car.tire_front), rear: known(&truth.rear, &car.tire_rear) };
+    let known =
+        PerAxle { front: known(&truth.front, &car.tire_front), rear: known(&truth.rear, &car.tire_rear) };
     let name = format!("{} pace {pace:.2}", case.name);
     Ok((Run { name, vehicle, sequence, truth }, known, mu, pace))
 }
@@ -195,7 +203,11 @@ fn main() -> Result<()> {
                     let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
                     Run { name, vehicle, sequence, truth: PerAxle::default() }
                 };
-                let known = run.truth.clone().map(|t| Known { truth: with_truth.then_some(t), plateau_rad: None, peak: None });
+                let known = run.truth.clone().map(|t| Known {
+                    truth: with_truth.then_some(t),
+                    plateau_rad: None,
+                    peak: None,
+                });
                 println!("{}", row(&run, &known, f64::NAN, f64::NAN, None)?);
             }
         }

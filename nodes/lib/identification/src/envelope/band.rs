@@ -19,7 +19,12 @@ pub(crate) struct Band {
 
 impl Band {
     /// Of an axle found, with the direct fit's beside it; `offset` is the place of its first parameter.
-    pub(crate) fn new(run: &Identification, axle: &MagicFormula, direct: &MagicFormula, offset: usize) -> Self {
+    pub(crate) fn new(
+        run: &Identification,
+        axle: &MagicFormula,
+        direct: &MagicFormula,
+        offset: usize,
+    ) -> Self {
         let slips = if offset == 0 { &run.direct.slips.front } else { &run.direct.slips.rear };
         let furthest = slips.furthest_rad();
         let slip_rad: Vec<f64> = (1..=POINTS).map(|k| furthest * k as f64 / POINTS as f64).collect();

@@ -22,7 +22,10 @@ pub(super) fn tires(outcome: &Outcome) -> Markup {
     let valid = &outcome.valid_within;
     let degrees = |slip_rad: f64| format!("{}°", significant(slip_rad.to_degrees(), 3));
     let provisional = |axle: fn(&PerAxle<PeakFriction>) -> PeakFriction| {
-        outcome.provisional.as_ref().map_or_else(|| "–".to_owned(), |p| peak_friction(&axle(&p.peak_friction)))
+        outcome
+            .provisional
+            .as_ref()
+            .map_or_else(|| "–".to_owned(), |p| peak_friction(&axle(&p.peak_friction)))
     };
     table(
         ["", "Front", "Rear"],
@@ -40,7 +43,11 @@ pub(super) fn tires(outcome: &Outcome) -> Markup {
             ],
             ["Slip visited".into(), slip(&outcome.slip_range_rad.front), slip(&outcome.slip_range_rad.rear)],
             ["Valid up to a slip of".into(), degrees(valid.slip_rad.front), degrees(valid.slip_rad.rear)],
-            ["Force promised at most / N".into(), significant(valid.force_n.front, 3), significant(valid.force_n.rear, 3)],
+            [
+                "Force promised at most / N".into(),
+                significant(valid.force_n.front, 3),
+                significant(valid.force_n.rear, 3),
+            ],
             letter("B / (1/rad)", "b", f.b, r.b),
             letter("C", "c", f.c, r.c),
             letter("D", "d", f.d, r.d),
