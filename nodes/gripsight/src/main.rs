@@ -18,6 +18,7 @@ mod notes;
 mod outputs;
 mod predictions;
 mod simulate;
+mod verify;
 mod withheld;
 
 use std::io::IsTerminal as _;
@@ -41,6 +42,7 @@ Results go to standard output, progress and logs to standard error; RUST_LOG=deb
 #[derive(Debug, Subcommand)]
 enum Command {
     Identify(identify::IdentifyArgs),
+    Verify(verify::VerifyArgs),
     Diagnose(diagnose::DiagnoseArgs),
     Friction(friction::FrictionArgs),
     Simulate(simulate::SimulateArgs),
@@ -82,6 +84,7 @@ fn main() -> ExitCode {
 fn run(command: Command) -> anyhow::Result<Outcome> {
     match command {
         Command::Identify(args) => identify::run(&args),
+        Command::Verify(args) => verify::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Friction(args) => friction::run(&args),
         Command::Simulate(args) => simulate::run(&args),

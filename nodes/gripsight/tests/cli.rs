@@ -74,7 +74,7 @@ fn json(path: &Path) -> Value {
 
 #[test]
 fn help_says_what_each_command_does() {
-    for command in ["identify", "friction"] {
+    for command in ["identify", "verify", "friction"] {
         let output = gripsight(&[command, "--help"]);
         assert_eq!(code(&output), 0);
         insta::assert_snapshot!(format!("help_{command}"), String::from_utf8(output.stdout).unwrap());
@@ -107,6 +107,10 @@ fn every_file_is_written_and_the_exit_code_says_whether_to_use_them() {
         let (output, folder) = Drive::shared().identify(out, more);
         let result = json(&folder.join("identification.json"));
         let accepted = result["accepted"].as_bool().unwrap();
+        assert_eq!(accepted, ["accepted", "accepted_within"].contains(&result["status"].as_str().unwrap()));
+        for limit in ["slip_rad", "force_n"] {
+            assert_eq!(result["valid_within"][limit]["front"].is_f64(), accepted, "{limit}");
+        }
         assert_eq!(code(&output), if accepted { 0 } else { 3 }, "{}", stderr(&output));
         let tire_files = if accepted {
             ["pacejka.yaml", "f1tenth_pacejka.txt", "f1tenth_lookup_table.csv"]
@@ -115,6 +119,13 @@ fn every_file_is_written_and_the_exit_code_says_whether_to_use_them() {
         };
         let mut expected = vec!["identification.json", "report.html", "timing.json"];
         expected.extend(tire_files);
+        // A prior with a say adds a set of its own.
+        let provisional = [
+            "pacejka.provisional.yaml",
+            "f1tenth_pacejka.provisional.txt",
+            "f1tenth_lookup_table.provisional.csv",
+        ];
+        expected.extend(provisional.iter().filter(|_| result["provisional"].is_object()));
         expected.sort_unstable();
         let mut found: Vec<_> =
             fs::read_dir(&folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
@@ -151,6 +162,50 @@ fn every_file_is_written_and_the_exit_code_says_whether_to_use_them() {
         assert!(stdout.starts_with(if accepted { "f1tenth: accepted" } else { "f1tenth: not accepted" }));
         assert!(stdout.lines().count() < 40);
     }
+}
+
+#[test]
+fn a_set_holds_on_its_own_drive_and_a_set_that_promises_more_does_not() {
+    let drive = Drive::shared();
+    let (output, folder) = drive.identify("to_verify", &["--residual", "none"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let (bag, vehicle) = (drive.file("laps.mcap"), drive.file("laps.vehicle.yaml"));
+    let verify = |set: &Path| gripsight(&["verify", set.to_str().unwrap(), &bag, "--vehicle", &vehicle]);
+    for name in ["pacejka.yaml", "f1tenth_pacejka.txt", "identification.json"] {
+        let output = verify(&folder.join(name));
+        let stdout = String::from_utf8(output.stdout.clone()).unwrap();
+        assert_eq!(code(&output), 0, "{name}: {stdout} {}", stderr(&output));
+        assert!(
+            stdout.contains("may be used") && stdout.contains("force error over these slips"),
+            "{stdout}"
+        );
+    }
+    let text = fs::read_to_string(folder.join("pacejka.yaml")).unwrap();
+    let grippy = PathBuf::from(drive.file("grippy.yaml"));
+    fs::write(&grippy, text.replace("friction_coeff: 1.0", "friction_coeff: 1.5")).unwrap();
+    let output = verify(&grippy);
+    let stdout = String::from_utf8(output.stdout.clone()).unwrap();
+    assert_eq!(code(&output), 3, "{stdout}");
+    assert!(stdout.contains("must not be used") && stdout.contains("too much"), "{stdout}");
+    assert_eq!(code(&verify(Path::new("/nowhere.yaml"))), 1);
+}
+
+#[test]
+fn bags_of_one_car_are_identified_together() {
+    let drive = Drive::shared();
+    let bag = drive.file("laps.mcap");
+    let (output, folder) = drive.identify("together", &["--residual", "none", &bag]);
+    let result = json(&folder.join("identification.json"));
+    assert_eq!(code(&output), 0, "{} {}", stderr(&output), result["reasons"]);
+    // The same drive twice: nothing disagrees, and intervals are no wider.
+    assert!(!result["reasons"].to_string().contains("disagrees"), "{}", result["reasons"]);
+    let (_, alone) = drive.identify("one_of_them", &["--residual", "none"]);
+    let width = |folder: &Path| {
+        let k = &json(&folder.join("identification.json"))["cornering_stiffness_n_per_rad"]["rear"];
+        k["high"].as_f64().unwrap() - k["low"].as_f64().unwrap()
+    };
+    assert!(width(&folder) < width(&alone));
+    assert!(stderr(&drive.identify("no", &["--window", "5", &bag]).0).contains("are for one bag"));
 }
 
 #[test]

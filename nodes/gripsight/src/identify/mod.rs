@@ -3,11 +3,12 @@
 mod previous;
 mod progress;
 mod summary;
+mod together;
 mod truth;
 mod windows;
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, bail};
@@ -41,16 +42,20 @@ use windows::Windows;
 /// A bag of odometry and drive commands is taken as one stretch. A bag of recorded state sequences is worked through in
 /// their order, as the nodes do live, each starting from the set accepted last; the files describe the last one. So is a bag
 /// of odometry with --window; windows.csv then holds every window, and when a change of the grip was noticed.
+///
+/// Several bags of one car give more slip and tighter intervals; where one of them alone says something else than all together, that is said.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   gripsight identify laps.mcap --vehicle car.yaml --out result
   gripsight identify laps.mcap --vehicle car.yaml --prior-mu 1.0 --out result
+  gripsight identify morning.mcap noon.mcap --vehicle car.yaml --out result
   gripsight identify laps.mcap --vehicle car.yaml --window 20 --hop 5 --out result
   gripsight identify laps.mcap --vehicle car.yaml --camera --method paper --seed 3 --out result")]
 pub(crate) struct IdentifyArgs {
-    /// An .mcap file or a rosbag2 folder.
-    bag: PathBuf,
+    /// An .mcap file or a rosbag2 folder; several of one car are identified together.
+    #[arg(required = true, value_name = "BAG")]
+    bags: Vec<PathBuf>,
     /// The car, as a ROS 2 parameter file; without it, an F1TENTH-class 1:10 car.
     #[arg(long, value_name = "FILE")]
     vehicle: Option<PathBuf>,
@@ -158,7 +163,7 @@ impl IdentifyArgs {
 
     fn prior(&self, topics: &TopicMap) -> anyhow::Result<Option<FrictionPrior>> {
         if self.camera {
-            return prior_of_bag(&self.bag, topics, &self.network).map(Some);
+            return prior_of_bag(self.bag(), topics, &self.network).map(Some);
         }
         Ok(self.prior_mu.map(|mu| FrictionPrior { mu, sigma: self.prior_sigma }))
     }
@@ -170,15 +175,20 @@ impl IdentifyArgs {
             Some(length_s) => WindowConfig { length_s, hop_s: self.hop },
             None => WindowConfig { length_s: f64::INFINITY, hop_s: f64::INFINITY },
         };
-        let (mut sequences, report) = read_sequences(&self.bag, topics, window)?;
+        let (mut sequences, report) = read_sequences(self.bag(), topics, window)?;
         if let Some(id) = self.sequence {
             let ids: Vec<String> = sequences.iter().map(|s| s.sequence_id.to_string()).collect();
             sequences.retain(|s| s.sequence_id == id);
             if sequences.is_empty() {
-                bail!("no state sequence {id} in {} (there are: {})", self.bag.display(), ids.join(", "));
+                bail!("no state sequence {id} in {} (there are: {})", self.bag().display(), ids.join(", "));
             }
         }
         Ok((sequences, report))
+    }
+
+    /// The bag, the first of several.
+    fn bag(&self) -> &Path {
+        self.bags.first().map_or(Path::new(""), PathBuf::as_path)
     }
 }
 
@@ -190,10 +200,14 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
     let mut previous = args.previous.as_deref().map(previous::read).transpose()?;
     let model = args.extended_model.as_deref().map(extended_model).transpose()?;
     let (mut sequences, report) = args.sequences(&topics)?;
+    let mut alone = Vec::new();
+    if args.bags.len() > 1 {
+        (sequences, alone) = together::read(args, &topics, sequences)?;
+    }
     if let Some(model) = &model {
         for sequence in &mut sequences {
             *sequence = without_effects(sequence, &vehicle, model)
-                .with_context(|| format!("cannot take the effects out of {}", args.bag.display()))?;
+                .with_context(|| format!("cannot take the effects out of {}", args.bag().display()))?;
         }
     }
     let notes = data_notes(&report, model.as_ref());
@@ -207,9 +221,10 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
     let mut windows = Windows::default();
     for sequence in &sequences {
         let mut stages = progress.run(&config);
-        let result =
+        let mut result =
             identify(sequence, &vehicle, prior, previous.as_ref(), &config, &mut |stage| stages.enter(stage))
-                .with_context(|| format!("cannot identify the tires from {}", args.bag.display()))?;
+                .with_context(|| format!("cannot identify the tires from {}", args.bag().display()))?;
+        together::compare(args, &alone, &vehicle, &mut result)?;
         timing.add(&stages.finish());
         let writing = Instant::now();
         let files = write(args, &vehicle, &notes, sequence, &result)?;
@@ -221,7 +236,7 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
         last = Some((result, files));
     }
     timing.total_s = start.elapsed().as_secs_f64();
-    let Some((result, mut files)) = last else { bail!("{}: no state sequence", args.bag.display()) };
+    let Some((result, mut files)) = last else { bail!("{}: no state sequence", args.bag().display()) };
     if sequences.len() > 1 {
         files.push(windows.write(&args.out)?);
     }
@@ -235,7 +250,7 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
 
 /// The car's name: the vehicle file's, else the bag's.
 fn car_name(args: &IdentifyArgs, vehicle: &VehicleParameters) -> String {
-    let stem = || args.bag.file_stem().map(|s| s.to_string_lossy().into_owned());
+    let stem = || args.bag().file_stem().map(|s| s.to_string_lossy().into_owned());
     vehicle.name.clone().or_else(stem).unwrap_or_else(|| "car".into())
 }
 
@@ -249,7 +264,7 @@ fn write(
 ) -> anyhow::Result<Vec<PathBuf>> {
     let provenance = Provenance {
         car: car_name(args, vehicle),
-        bag: file_name(&args.bag),
+        bag: args.bags.iter().map(|bag| file_name(bag)).collect::<Vec<_>>().join(" + "),
         data_stamp_ns: sequence.start_stamp_ns,
         tool_version: env!("CARGO_PKG_VERSION").to_owned(),
         vehicle_hash: result.key.vehicle_hash.clone(),

@@ -10,6 +10,12 @@ use gripsight_identification::{
 use gripsight_vehicle::PacejkaParameters;
 use serde::Deserialize;
 
+/// What became of it.
+#[derive(Deserialize)]
+struct Verdict {
+    status: Status,
+}
+
 /// The part of identification.json that a later run needs.
 #[derive(Deserialize)]
 struct Earlier {
@@ -48,11 +54,13 @@ struct Change {
 /// Reads an accepted set.
 pub(super) fn read(path: &Path) -> anyhow::Result<AcceptedSet> {
     let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let earlier: Earlier = serde_json::from_str(&text)
-        .with_context(|| format!("{} is not an identification.json", path.display()))?;
-    if !earlier.status.accepted() {
+    let not_one = || format!("{} is not an identification.json", path.display());
+    // What was not accepted has no limits to read.
+    let verdict: Verdict = serde_json::from_str(&text).with_context(not_one)?;
+    if !verdict.status.accepted() {
         bail!("{}: that identification was not accepted", path.display());
     }
+    let earlier: Earlier = serde_json::from_str(&text).with_context(not_one)?;
     Ok(AcceptedSet {
         vehicle_hash: earlier.key.vehicle_hash,
         sequence_id: earlier.key.sequence_id,

@@ -1,14 +1,14 @@
 //! What a set may be used for, and why: every reason with its figure.
 //!
-//! What counts is the error in force over the slips driven and its harm to a controller. A curve that is known to a factor of [`KNOWN_WITHIN`] is handed
-//! on, with no force promised beyond what was shown of it; one that is known worse is not.
+//! What counts is the error in force over the slips driven and its harm to a controller. A curve that is known to a factor of [`KNOWN_WITHIN`] to either
+//! side is handed on, with no force promised beyond what was shown of it; one that is known worse is not.
 
 use crate::conclude::unstable_at_mps;
 use crate::envelope::Envelope;
 use crate::{Identification, Outcome, PeakFriction, Status, ValidWithin};
 
-/// The upper over the lower end of a force, stiffness included, at any slip driven: a controller with the classical gain margin of 6 dB bears a
-/// plant whose gain is known to this factor.
+/// A force, stiffness included, over the lower end of its interval at any slip driven: a controller with the classical gain margin of 6 dB bears a
+/// plant whose gain is off by this factor to either side.
 const KNOWN_WITHIN: f64 = 2.0;
 
 /// Scatter of v_y that is said, as a share of the slip at which the rear tires' linear force would meet their peak.
@@ -129,7 +129,7 @@ fn forces(envelope: &Envelope, outcome: &Outcome, verdict: &mut Verdict) {
     for (axle, k, factor) in
         [("front", stiffness.front, envelope.factor.front), ("rear", stiffness.rear, envelope.factor.rear)]
     {
-        let stiff = k.high / k.low;
+        let stiff = k.value / k.low;
         if stiff.is_nan() || stiff > KNOWN_WITHIN {
             verdict.against.push(format!(
                 "{axle} cornering stiffness is known to a factor of {stiff:.1} only (90 % interval; {KNOWN_WITHIN:.1} can be steered by)"

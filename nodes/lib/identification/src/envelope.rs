@@ -58,7 +58,7 @@ impl ValidWithin {
 pub(crate) struct Envelope {
     pub(crate) tires: PacejkaParameters,
     pub(crate) valid_within: ValidWithin,
-    /// Largest upper over lower end of the curve's interval within the slips driven.
+    /// Largest force over the lower end of its interval within the slips driven.
     pub(crate) factor: PerAxle<f64>,
 }
 

@@ -27,6 +27,7 @@ mod run;
 mod start;
 mod sweep;
 pub mod tires;
+mod together;
 
 pub use candidate::{
     AcceptedSet, Candidate, Estimate, FrictionPrior, PerAxle, Range, RunKey, SignalCorrections, vehicle_hash,
@@ -45,3 +46,4 @@ pub use residual::train_residual;
 pub use residual_model::{INPUTS, OUTPUTS, ResidualModel};
 pub use rollout::Nuisance;
 pub use run::{Identification, Next, Stage, Started, Swept, identify};
+pub use together::{AxleCheck, Disagreement, Verification, disagreements, join, verify};

@@ -4,6 +4,7 @@
 //! envelope draws FROM TO DURATION_S          drives of the reference car drawn from seeds, at paces from a stroll to the limit
 //! envelope bags FOLDER...                    bag folders, with `truth_axle_forces.csv` where a plant knows its forces
 //! envelope priors FROM TO DURATION_S         the same drives with friction priors off by -0.6 to 0.6, of any sigma
+//! envelope grip FROM TO                      drives whose grip falls, or does not, while the set found before is watched
 //! ```
 //!
 //! Writes a row a run to standard output (csv); `envelope.py` beside the results makes the tables of it. No truth is read by the product.
@@ -11,6 +12,7 @@
 #[allow(dead_code)]
 #[path = "../accuracy/cases.rs"]
 mod cases;
+mod grip;
 #[allow(dead_code)]
 #[path = "../support/mod.rs"]
 mod support;
@@ -178,7 +180,10 @@ fn drawn(seed: u64, duration_s: f64) -> Result<(Run, PerAxle<Known>, f64, f64)> 
 
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let Some((mode, rest)) = arguments.split_first() else { bail!("draws, bags or priors?") };
+    let Some((mode, rest)) = arguments.split_first() else { bail!("draws, bags, priors or grip?") };
+    if let ("grip", [from, to]) = (mode.as_str(), rest) {
+        return grip::run(from.parse()?, to.parse()?);
+    }
     println!("{}", header());
     match (mode.as_str(), rest) {
         ("draws" | "priors", [from, to, duration_s]) => {

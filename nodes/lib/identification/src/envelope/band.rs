@@ -37,11 +37,11 @@ impl Band {
         self.slip_rad.last().copied().unwrap_or(f64::NAN)
     }
 
-    /// Largest upper over lower end of the interval; infinite where the lower end is not positive.
+    /// Largest force over the lower end of its interval; infinite where that is not positive.
     pub(crate) fn factor(&self) -> f64 {
         let factors = self.force.iter().zip(&self.half).map(|(force, half)| {
-            let (low, high) = (force - half, force + half);
-            if low > 0.0 && high.is_finite() { high / low } else { f64::INFINITY }
+            let low = force - half;
+            if low > 0.0 && low.is_finite() { force / low } else { f64::INFINITY }
         });
         factors.fold(1.0, f64::max)
     }

@@ -117,7 +117,7 @@ fn foreign_tire_files_are_read_or_refused_with_the_reason() {
     assert!(error(&format!("{MPC}extra: 1\n")).contains("extra"));
     assert!(error(&MPC.replace("Er: -0.0000001\n", "")).contains("Er"));
     assert!(error(&MPC.replace("7.25", "-7.25")).contains("B front is -7.25"));
-    assert!(error(&MPC.replace("0.25", ".nan")).contains("line 11"));
+    assert!(error(&MPC.replace("0.25", ".nan")).contains("line 13"));
     assert!(error("][").starts_with("tire file"));
     assert!(error("").starts_with("tire file"));
 }
