@@ -87,7 +87,7 @@ pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Outcome> {
     checked.against.iter().for_each(|reason| println!("  - {reason}"));
     if drive.status != Status::Rejected {
         let limit = |v: Option<f64>| match v.filter(|v| v.is_finite()) {
-            Some(v) => format!("{}", fixed(v.to_degrees(), 1)),
+            Some(v) => fixed(v.to_degrees(), 1),
             None => "not stated".to_owned(),
         };
         let row = |name: &str, of: &dyn Fn(&AxleCheck) -> String| {
