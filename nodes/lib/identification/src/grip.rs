@@ -26,7 +26,8 @@ const EVERY_S: f64 = 0.1;
 const LOOKS: usize = 2;
 /// Share of the largest force promised that has to be asked for.
 const ASKED: f64 = 0.5;
-/// Share of the promised force that has to be missing. On normal drives of the reference car 99.9 % of the looks miss less (`examples/envelope grip`).
+/// Share of the promised force that has to be missing. Watched before any fall, 39 drives of the reference car missed 0.20 at most, and that in a single look
+/// (`examples/envelope grip`, seeds 33000-33039).
 const FALL: f64 = 0.2;
 /// v_y at either end is a mean over this share of the look.
 const ENDS: f64 = 0.2;
