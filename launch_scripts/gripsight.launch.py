@@ -40,7 +40,9 @@ def topics_of(stack: str) -> dict:
         path = project_folder() / "params" / "stacks" / f"{stack}.yaml"
     if not path.is_file():
         raise RuntimeError(f"no stack '{stack}': neither a file nor one of params/stacks")
-    return yaml.safe_load(path.read_text()) or {}
+    entries = yaml.safe_load(path.read_text()) or {}
+    names = {name: entry.get("topic") if isinstance(entry, dict) else entry for name, entry in entries.items()}
+    return {"file": str(path.resolve()), **{name: topic for name, topic in names.items() if topic}}
 
 
 def nodes(context):
@@ -64,7 +66,7 @@ def nodes(context):
         )
 
     started = [
-        node("telemetry", remaps("odom", "drive", "imu", "wheels")),
+        node("telemetry", remaps("odom", "drive", "imu", "wheels"), topics_file=topics["file"]),
         node(
             "s4_residual",
             [*remaps("odom", "drive"), ("sequence", "telemetry/sequence"), ("candidate", "identifier/candidate")],

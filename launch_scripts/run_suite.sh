@@ -56,11 +56,11 @@ if [[ ! -f $stack ]]; then stack=$root/params/stacks/$stack.yaml; fi
 for file in "$vehicle" "$stack" "$params"; do [[ -f $file ]] || fail "no file '$file'"; done
 if [[ -n $bag && ! -e $bag ]]; then fail "no bag '$bag'"; fi
 
-# A stack's file maps the suite's topic names to the car's: `odom: /car_state/odom`.
+# A stack's file maps the suite's topic names to the car's: `odom: /car_state/odom`. What it maps signal by signal, telemetry reads itself.
 remaps() {
     local name
     for name in "$@"; do
-        sed -n "s|^$name: *\([^ #]*\).*|-r\n$name:=\1|p" "$stack"
+        sed -n -e "s|^$name: *{topic: *\([^ ,}]*\).*|-r\n$name:=\1|p" -e "s|^$name: *\(/[^ #]*\).*|-r\n$name:=\1|p" "$stack"
     done
 }
 
@@ -92,7 +92,7 @@ mapfile -t car < <(remaps odom drive imu wheels)
 mapfile -t motion < <(remaps odom drive)
 mapfile -t eyes < <(remaps odom image image/compressed)
 
-start telemetry "${car[@]}" "${replay[@]}"
+start telemetry "${car[@]}" -p "topics_file:=$stack" "${replay[@]}"
 start s4_residual "${motion[@]}" -r sequence:=telemetry/sequence -r candidate:=identifier/candidate "${replay[@]}"
 start identifier "${motion[@]}" -r sequence:=telemetry/sequence -r model:=s4_residual/model -r friction:=camera_prior/friction "${replay[@]}"
 if $camera; then

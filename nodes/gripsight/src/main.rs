@@ -10,6 +10,7 @@
 
 mod bag;
 mod camera;
+mod data;
 mod diagnose;
 mod friction;
 mod identify;

@@ -1,11 +1,11 @@
 //! What the node holds: the streams on their way to a window. No ROS, no clock.
 
-use gripsight_signals::{Layout, Measurement, Sequencer, SignalError, StateSequence, WindowConfig};
+use gripsight_signals::{Layout, Measurement, Sequencer, Signal, SignalError, StateSequence, WindowConfig};
 
 /// Counts for the diagnostics.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Counts {
-    /// Messages by stream: odometry, drive, inertial unit, wheels.
+    /// Messages by stream: what carries the speed (odometry), what carries the steering (drive), inertial unit, wheels.
     pub(crate) taken: [usize; 4],
     /// Messages left out: not finite, late, or with the stamp of the one before.
     pub(crate) rejected: usize,
@@ -20,6 +20,8 @@ pub(crate) struct Counts {
 /// Aligns the streams and cuts windows, by the rules that the offline command follows.
 pub(crate) struct Buffer {
     window: WindowConfig,
+    /// The streams that the counts are of.
+    streams: [usize; 4],
     sequencer: Sequencer,
     sequences: usize,
     /// What was wrong with the last message that was left out.
@@ -28,7 +30,15 @@ pub(crate) struct Buffer {
 
 impl Buffer {
     pub(crate) fn new(window: WindowConfig, layout: Layout) -> Result<Self, SignalError> {
-        Ok(Self { window, sequencer: Sequencer::new(window, layout)?, sequences: 0, last_problem: None })
+        let steering = layout.source(Signal::Steering).or(layout.source(Signal::MeasuredSteering));
+        let streams = [layout.clock(), steering.unwrap_or(1), 2, 3];
+        Ok(Self {
+            window,
+            streams,
+            sequencer: Sequencer::new(window, layout)?,
+            sequences: 0,
+            last_problem: None,
+        })
     }
 
     /// Takes a message; gives the windows that it closes.
@@ -53,7 +63,7 @@ impl Buffer {
     pub(crate) fn counts(&self) -> Counts {
         let taken = self.sequencer.taken();
         Counts {
-            taken: self.sequencer.aligner().counts(),
+            taken: self.streams.map(|stream| self.sequencer.aligner().count(stream)),
             rejected: taken.left_out(),
             without_drive: taken.without_drive,
             clock_jumps: taken.clock_jumps,

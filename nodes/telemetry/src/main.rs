@@ -2,6 +2,7 @@
 
 mod buffer;
 mod diagnostics;
+mod mapped;
 mod node;
 
 fn main() -> anyhow::Result<()> {

@@ -1,18 +1,20 @@
 //! Topics in, topics out.
 
+use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use gripsight_bag::{decode, encode, sequence_to_messages};
+use gripsight_bag::{LiveStreams, Role, TopicMap, decode, encode, sequence_to_messages};
 use gripsight_msgs::standard::ackermann_msgs::AckermannDriveStamped;
 use gripsight_msgs::standard::nav_msgs::Odometry;
 use gripsight_msgs::standard::sensor_msgs::{Imu, JointState};
 use gripsight_msgs::standard::std_msgs::Header;
 use gripsight_msgs::{Excitation as ExcitationMessage, Handshake, Range, StateSequence as SequenceMessage};
 use gripsight_runtime::{Descriptor, Node, Publisher, Qos};
-use gripsight_signals::{Excitation, Layout, Measurement, StateSequence, WindowConfig};
+use gripsight_signals::{Excitation, Measurement, StateSequence, WindowConfig};
 
 use crate::buffer::{Buffer, Counts};
 use crate::diagnostics::{Facts, status};
+use crate::mapped;
 
 /// Chunks that a late joiner still gets: those of the last few sequences.
 const SEQUENCE_DEPTH: usize = 64;
@@ -34,13 +36,26 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
             .read_only(),
     )?;
     let window = WindowConfig { length_s: length_s.get(), hop_s: hop_s.get().min(length_s.get()) };
-    let buffer = Buffer::new(window, Layout::default())?;
+    let file = node.parameter(
+        "topics_file",
+        String::new(),
+        Descriptor::new("A topics file (params/stacks): which field of which topic carries which signal; empty: odom, drive, imu, wheels")
+            .read_only(),
+    )?;
+    let live = match file.get().as_str() {
+        "" => LiveStreams::default(),
+        path => TopicMap::read(Path::new(path))?.live()?,
+    };
+    live.cannot.iter().for_each(|what| tracing::warn!("{what}"));
+    let buffer = Buffer::new(window, live.layout.clone())?;
 
     let sensor = node.sensor_qos(50);
     let mut odometry = node.subscription::<Odometry>("odom", sensor)?;
     let mut drive = node.subscription::<AckermannDriveStamped>("drive", sensor)?;
     let mut imu = node.subscription::<Imu>("imu", sensor)?;
     let mut wheels = node.subscription::<JointState>("wheels", sensor)?;
+    let mut mapped = mapped::subscribe(node, &live, sensor)?;
+    let [odom_used, drive_used, imu_used, wheels_used] = Role::ALL.map(|role| mapped::follows(&live, role));
     let outputs = Outputs {
         sequence: node.publisher("~/sequence", Qos::latched().with_depth(SEQUENCE_DEPTH))?,
         excitation: node.publisher("~/excitation", Qos::latched())?,
@@ -54,20 +69,21 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
         let mut ticks = tokio::time::interval(Duration::from_secs(1));
         loop {
             let measurement = tokio::select! {
-                Some(message) = odometry.next() => {
+                Some(message) = odometry.next(), if odom_used => {
                     let sample = decode::odometry(&message);
                     state.frame_id = message.header.frame_id;
                     Some(Measurement::Odometry(sample))
                 }
-                Some(message) = drive.next() => Some(Measurement::Drive(decode::drive(&message))),
-                Some(message) = imu.next() => decode::imu(&message).map(Measurement::Imu),
-                Some(message) = wheels.next() => match decode::wheels(&message) {
+                Some(message) = drive.next(), if drive_used => Some(Measurement::Drive(decode::drive(&message))),
+                Some(message) = imu.next(), if imu_used => decode::imu(&message).map(Measurement::Imu),
+                Some(message) = wheels.next(), if wheels_used => match decode::wheels(&message) {
                     Ok(sample) => sample.map(Measurement::Wheels),
                     Err(error) => {
                         state.buffer.last_problem = Some(error.to_string());
                         None
                     }
                 },
+                Some(measurement) = mapped.recv() => Some(measurement),
                 _ = ticks.tick() => {
                     diagnostics.report("telemetry", status(&state.facts()));
                     state.seen = state.buffer.counts();

@@ -102,7 +102,7 @@ fn wheel_places(names: &[String]) -> Option<[usize; 4]> {
     Some([fl, fr, rl, rr])
 }
 
-fn wheel_of(name: &str) -> Option<usize> {
+pub(crate) fn wheel_of(name: &str) -> Option<usize> {
     let name = name.to_lowercase();
     let parts: Vec<&str> = name.split(|c: char| !c.is_ascii_alphabetic()).collect();
     let short = parts.iter().find_map(|part| match *part {

@@ -16,12 +16,69 @@ pub enum BagError {
         /// What the system said.
         error: std::io::Error,
     },
-    /// Neither an MCAP file nor a rosbag2 folder of MCAP files.
+    /// Neither an MCAP or sqlite3 file nor a rosbag2 folder of such files.
     #[error("{}: not a bag gripsight can read: {why}", path.display())]
     NotABag {
         /// The path given.
         path: PathBuf,
         /// What was found instead.
+        why: String,
+    },
+    /// A bag of ROS 1.
+    #[error(
+        "{0}: a ROS 1 bag; convert it: `pip install rosbags`, then `rosbags-convert --src {0} --dst {1}`",
+        path.display(), path.with_extension("").display()
+    )]
+    Ros1 {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A message of a sqlite3 file that cannot be.
+    #[error("{}, message {message}: {why}", path.display())]
+    Sqlite {
+        /// The file.
+        path: PathBuf,
+        /// Its number in the table `messages`.
+        message: i64,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// The text of a message type does not read, or is not there.
+    #[error("type {type_name}: {why}")]
+    Layout {
+        /// The type.
+        type_name: String,
+        /// What is wrong.
+        why: String,
+    },
+    /// A field that a topics file names leads to no number.
+    #[error("{type_name}, field `{field}`: {why}")]
+    Field {
+        /// The type.
+        type_name: String,
+        /// The path as given.
+        field: String,
+        /// What stands there.
+        why: String,
+    },
+    /// A signal of a topics file cannot be taken from the bag.
+    #[error("{}: {signal}: {why}", path.display())]
+    Mapping {
+        /// The bag.
+        path: PathBuf,
+        /// The signal, as the topics file names it.
+        signal: &'static str,
+        /// What is wrong.
+        why: String,
+    },
+    /// Bytes that are no message of a type known by its text alone.
+    #[error("{len} bytes are no {type_name}: {why}")]
+    DynamicBody {
+        /// The type.
+        type_name: String,
+        /// Bytes there.
+        len: usize,
+        /// What the reader met.
         why: String,
     },
     /// The file follows another profile than ROS 2.
@@ -72,7 +129,8 @@ pub enum BagError {
         path: PathBuf,
     },
     /// A stream that is needed is not there.
-    #[error("{}: no topic for {role}: looked for {wanted}; the bag holds {found}", path.display())]
+    #[error("{}: no topic for {role}: looked for {wanted}; the bag holds {found}; `gripsight bag info --write-topics FILE` proposes where to take it from, and `--topics FILE` takes the file",
+        path.display())]
     MissingTopic {
         /// The bag.
         path: PathBuf,

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use gripsight_signals::{DataHealth, Pace, WindowConfig};
+use gripsight_signals::{Checks, DataHealth, Pace, WindowConfig, cross_check};
 use serde::Serialize;
 
 use crate::telemetry::sequences_of;
@@ -57,6 +57,8 @@ pub enum Usable {
         report: Box<ReadReport>,
         /// State of the data, one entry for each sequence.
         health: Vec<DataHealth>,
+        /// What the signals say of each other, one entry for each sequence.
+        checks: Vec<Checks>,
     },
     /// It cannot, and this is why.
     Nothing(String),
@@ -112,7 +114,8 @@ fn usable(bag: &Bag, topics: &TopicMap) -> Usable {
     let whole = WindowConfig { length_s: f64::INFINITY, hop_s: f64::INFINITY };
     let looked = sequences_of(bag, topics, whole).and_then(|(sequences, report)| {
         let health = sequences.iter().map(DataHealth::of).collect::<Result<_, _>>()?;
-        Ok(Usable::Sequences { report: Box::new(report), health })
+        let checks = sequences.iter().map(cross_check).collect::<Result<_, _>>()?;
+        Ok(Usable::Sequences { report: Box::new(report), health, checks })
     });
     looked.unwrap_or_else(|error| Usable::Nothing(error.to_string()))
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::bag::{Messages, check_profile};
+use crate::storage::{Kind, source};
 use crate::writer::part_of;
 use crate::{BagError, BagWriter, rosbag2};
 
@@ -50,8 +51,11 @@ fn copy_whole(
     writer: &mut Option<BagWriter>,
     messages: &mut u64,
 ) -> Result<(), BagError> {
-    check_profile(file)?;
-    for message in Messages::of([file.to_owned()]) {
+    let source = source(file)?;
+    if source.kind == Kind::Mcap {
+        check_profile(&source.path)?;
+    }
+    for message in Messages::of([source]) {
         let message = message?;
         let writer = match writer {
             Some(writer) => writer,

@@ -20,16 +20,14 @@ struct MetadataFile {
 
 #[derive(Deserialize)]
 struct Information {
-    storage_identifier: String,
     relative_file_paths: Vec<String>,
-    #[serde(default)]
-    compression_format: String,
-    #[serde(default)]
-    compression_mode: String,
 }
 
-/// The MCAP files of a bag in order: the file itself; what a folder's `metadata.yaml` names; or, where a recording was killed
-/// before that was written, the folder's `.mcap` files by number.
+/// Names of a bag's files end so.
+const ENDINGS: [&str; 4] = [".mcap", ".db3", ".mcap.zstd", ".db3.zstd"];
+
+/// The files of a bag in order: the file itself; what a folder's `metadata.yaml` names; or, where a recording was killed
+/// before that was written, the folder's files by number.
 pub(crate) fn files(path: &Path) -> Result<Vec<PathBuf>, BagError> {
     if path.is_file() {
         return Ok(vec![path.to_owned()]);
@@ -37,9 +35,9 @@ pub(crate) fn files(path: &Path) -> Result<Vec<PathBuf>, BagError> {
     let refuse = |why: String| BagError::NotABag { path: path.to_owned(), why };
     let metadata = path.join("metadata.yaml");
     if !metadata.is_file() {
-        let files = mcap_files(path)?;
+        let files = bag_files(path)?;
         return if files.is_empty() {
-            Err(refuse("a folder with neither metadata.yaml nor .mcap files".to_owned()))
+            Err(refuse("a folder with neither metadata.yaml nor .mcap or .db3 files".to_owned()))
         } else {
             Ok(files)
         };
@@ -47,36 +45,35 @@ pub(crate) fn files(path: &Path) -> Result<Vec<PathBuf>, BagError> {
     let text = std::fs::read_to_string(&metadata).map_err(BagError::io(&metadata))?;
     let MetadataFile { rosbag2_bagfile_information: information } =
         serde_saphyr::from_str(&text).map_err(|e| refuse(format!("metadata.yaml: {e}")))?;
-    if information.storage_identifier != "mcap" {
-        return Err(refuse(format!(
-            "storage `{}`, expected `mcap`; `ros2 bag convert` makes one of the other",
-            information.storage_identifier
-        )));
-    }
-    if !information.compression_mode.is_empty() && !information.compression_mode.eq_ignore_ascii_case("none")
-    {
-        return Err(refuse(format!(
-            "compressed by rosbag2 (mode `{}`, format `{}`); MCAP's own compression is read: `ros2 bag convert`",
-            information.compression_mode, information.compression_format
-        )));
-    }
     if information.relative_file_paths.is_empty() {
         return Err(refuse("metadata.yaml names no file".to_owned()));
     }
-    Ok(information.relative_file_paths.iter().map(|name| path.join(name)).collect())
+    Ok(information.relative_file_paths.iter().map(|name| named(path, name)).collect())
 }
 
-/// The `.mcap` files in a folder, ordered by the number at the end of their names (`bag_2` before `bag_10`).
-fn mcap_files(folder: &Path) -> Result<Vec<PathBuf>, BagError> {
+/// The file that `metadata.yaml` names. Early versions name the folder, too, and one that was compressed or unpacked by hand has another
+/// ending than its name.
+fn named(folder: &Path, name: &str) -> PathBuf {
+    let given = folder.join(name);
+    let base = folder.join(Path::new(name).file_name().unwrap_or_default());
+    let packed = PathBuf::from(format!("{}.zstd", base.display()));
+    let unpacked = base.with_extension("");
+    [&given, &base, &packed, &unpacked].into_iter().find(|p| p.is_file()).unwrap_or(&given).clone()
+}
+
+/// The bag files in a folder, ordered by the number at the end of their names (`bag_2` before `bag_10`).
+fn bag_files(folder: &Path) -> Result<Vec<PathBuf>, BagError> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(BagError::io(folder))? {
         let path = entry.map_err(BagError::io(folder))?.path();
-        if path.extension().is_some_and(|e| e == "mcap") {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        if ENDINGS.iter().any(|ending| name.ends_with(ending)) {
             files.push(path);
         }
     }
     files.sort_by_key(|path| {
-        let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = path.file_name().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+        let stem = name.split('.').next().unwrap_or_default().to_owned();
         let number = stem.rsplit('_').next().and_then(|n| n.parse::<u64>().ok());
         (number, stem)
     });

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use gripsight_signals::{Layout, Measurement, Sequencer, StateSequence, Taken, TopicHealth, WindowConfig};
+use gripsight_signals::{Measurement, Sequencer, StateSequence, Taken, TopicHealth, WindowConfig};
 use serde::Serialize;
 
 use crate::sequence::read_recorded;
@@ -53,6 +53,13 @@ fn measurements_of(bag: &Bag, topics: &TopicMap) -> Result<(Vec<Measurement>, Re
             Err(error) => return Err(error),
         };
         let topic = &message.channel.topic;
+        for mapped in report.streams.mapped().iter().filter(|mapped| mapped.topic == *topic) {
+            let measurement = mapped
+                .measurement(&message.data, message.log_time)
+                .map_err(|error| error.in_message(topic, measurements.len(), message.log_time))?;
+            measurements.push(measurement);
+            log_times_ns.push(message.log_time);
+        }
         let Some(role) = report.streams.role(topic) else { continue };
         let count = &mut report.counts[role as usize];
         match decode::measurement(role, &message.data) {
@@ -98,7 +105,7 @@ pub(crate) fn sequences_of(
         return Ok((recorded.into_iter().map(|r| r.sequence).collect(), report));
     }
     let (measurements, mut report) = measurements_of(bag, topics)?;
-    let mut sequencer = Sequencer::new(window, Layout::default())?;
+    let mut sequencer = Sequencer::new(window, report.streams.layout())?;
     let mut sequences = Vec::new();
     for measurement in measurements {
         sequences.extend(sequencer.push(measurement).0);

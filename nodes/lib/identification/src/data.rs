@@ -1,7 +1,7 @@
 //! Telemetry made ready for fitting: checked, cut into windows, and split into parts for fitting, choosing and judging.
 
 use gripsight_model::{Window, tile};
-use gripsight_signals::{DataHealth, Segment, StateSequence, segments};
+use gripsight_signals::{DataHealth, Segment, StateSequence, masked, segments};
 use gripsight_vehicle::VehicleParameters;
 
 use crate::IdentificationError;
@@ -49,6 +49,8 @@ const SLOW_SHARE: f64 = 0.25;
 pub(crate) const SLOW_MPS: f64 = 0.5;
 /// Half the length of the lines that give the derivative of v_x.
 const SLOPE_HALF_S: f64 = 0.1;
+/// A sensor that stands still for more of the time than this is no sensor.
+const MOST_FROZEN: f64 = 0.5;
 /// Fewest windows to fit anything to.
 pub(crate) const MIN_WINDOWS: usize = 12;
 
@@ -62,14 +64,18 @@ impl Data {
         min_windows: usize,
     ) -> Result<Self, IdentificationError> {
         vehicle.clone().checked()?;
-        let used = ["v_x_mps", "v_y_mps", "yaw_rate_radps"];
-        if let Some(span) = health.frozen.iter().find(|span| used.contains(&span.channel)) {
-            return Err(IdentificationError::Frozen {
-                channel: span.channel,
-                from_s: span.from_s,
-                to_s: span.to_s,
-            });
+        for channel in ["v_y_mps", "yaw_rate_radps"] {
+            let frozen: Vec<_> = health.frozen.iter().filter(|span| span.channel == channel).collect();
+            let frozen_s: f64 = frozen.iter().map(|span| span.to_s - span.from_s).sum();
+            if let (Some(first), Some(last)) = (frozen.first(), frozen.last())
+                && frozen_s > MOST_FROZEN * health.duration_s
+            {
+                return Err(IdentificationError::Frozen { channel, from_s: first.from_s, to_s: last.to_s });
+            }
         }
+        // Bad samples cost themselves; left out, they are a gap as a lost message makes one.
+        let usable = masked(sequence)?;
+        let sequence = &usable.sequence;
         let segments = segments(sequence, WINDOW_S)?;
         let dt_s = segments.first().map_or(f64::NAN, |s| s.dt_s);
         let len = ((WINDOW_S / dt_s).round() as usize).max(WINDOW_SAMPLES);

@@ -148,7 +148,7 @@ fn topics() -> Vec<TopicHealth> {
     let topic = |stream, name: &str, rate_hz: f64, spikes: Vec<Spikes>| TopicHealth {
         stream,
         topic: Some(name.to_owned()),
-        type_name: "nav_msgs/msg/Odometry",
+        type_name: "nav_msgs/msg/Odometry".into(),
         messages: (60.0 * rate_hz) as usize,
         pace: Pace { rate_hz, jitter_s: 1e-4, gaps: 0, longest_step_s: 1.1 / rate_hz, lost_share: 0.0 },
         delay_s: Some(0.004),

@@ -306,12 +306,14 @@ impl Aligner {
                 || around(signal).is_some_and(|(a, b, _)| near(a.stamp_ns) || near(b.stamp_ns));
             Some(interpolated(signal)).filter(|v| is_near && v.is_finite())
         };
+        let this = Row { stamp_ns: t_ns, values: *at_clock };
         let held = |signal: Signal| {
-            let rows = &self.streams.get(self.layout.source(signal)?)?.rows;
-            rows.front().filter(|row| row.stamp_ns <= t_ns && near(row.stamp_ns))
+            let place = self.layout.source(signal)?;
+            let row = if place == clock { &this } else { self.streams.get(place)?.rows.front()? };
+            Some(*row).filter(|row| row.stamp_ns <= t_ns && near(row.stamp_ns))
         };
         let commanded = self.layout.source(Signal::Steering).is_some();
-        let command = if commanded { Some(command(held(Signal::Steering)?)) } else { None };
+        let command = if commanded { Some(command(&held(Signal::Steering)?)) } else { None };
         let measured =
             self.layout.source(Signal::MeasuredSteering).map(|_| interpolated(Signal::MeasuredSteering));
         let mut drive = match command {

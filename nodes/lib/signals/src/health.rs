@@ -48,7 +48,7 @@ pub struct DataHealth {
 /// A real sensor does not repeat itself to the last digit for this long.
 const FROZEN_S: f64 = 0.5;
 /// Below this the car stands, and a sensor may well repeat itself.
-const MOVING_MPS: f32 = 0.3;
+pub(crate) const MOVING_MPS: f32 = 0.3;
 
 impl DataHealth {
     /// Looks at a sequence.
@@ -91,17 +91,31 @@ fn frozen(sequence: &StateSequence) -> Vec<FrozenSpan> {
         if !measured.contains(&channel) || values.is_empty() || constant {
             continue;
         }
-        let mut start = 0;
-        for k in 1..=values.len() {
-            if k < values.len() && values[k] == values[start] && sequence.v_x_mps[k].abs() > MOVING_MPS {
-                continue;
-            }
-            let (from_s, to_s) = (f64::from(sequence.time_s[start]), f64::from(sequence.time_s[k - 1]));
-            if to_s - from_s > FROZEN_S {
-                spans.push(FrozenSpan { channel, from_s, to_s });
-            }
-            start = k.min(values.len() - 1);
+        let wide: Vec<f64> = values.iter().map(|&v| f64::from(v)).collect();
+        let time_s: Vec<f64> = sequence.time_s.iter().map(|&t| f64::from(t)).collect();
+        for (from, to) in still_spans(&time_s, &wide, |k| sequence.v_x_mps[k].abs() > MOVING_MPS) {
+            spans.push(FrozenSpan { channel, from_s: time_s[from], to_s: time_s[to] });
         }
+    }
+    spans
+}
+
+/// First and last sample of every stretch over which a channel repeats itself for over half a second while `moving`.
+pub(crate) fn still_spans(
+    time_s: &[f64],
+    values: &[f64],
+    moving: impl Fn(usize) -> bool,
+) -> Vec<(usize, usize)> {
+    let mut spans = Vec::new();
+    let mut start = 0;
+    for k in 1..=values.len() {
+        if k < values.len() && values[k] == values[start] && moving(k) {
+            continue;
+        }
+        if time_s[k - 1] - time_s[start] > FROZEN_S {
+            spans.push((start, k - 1));
+        }
+        start = k.min(values.len() - 1);
     }
     spans
 }

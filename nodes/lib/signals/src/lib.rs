@@ -9,10 +9,12 @@
 
 mod align;
 mod channels;
+mod checks;
 mod error;
 mod excitation;
 mod health;
 mod layout;
+mod mask;
 mod measurement;
 mod segment;
 mod sequence;
@@ -23,10 +25,12 @@ mod window;
 
 pub use align::{AlignConfig, Aligner, Pushed};
 pub use channels::{CHANNELS, Channel, Clock, Kind};
+pub use checks::{Check, Checks, Finding, Pair, Unchecked, cross_check};
 pub use error::SignalError;
 pub use excitation::Excitation;
 pub use health::{DataHealth, FrozenSpan, Gap};
 pub use layout::Layout;
+pub use mask::{BadKind, BadSpan, Masked, masked};
 pub use measurement::{
     DriveSample, ImuSample, MappedSample, Measurement, OdometrySample, PoseSample, TelemetrySample,
     WheelsSample,

@@ -1,5 +1,7 @@
 //! What is wrong with the messages of one topic, before streams are joined.
 
+use std::borrow::Cow;
+
 use serde::Serialize;
 
 use crate::segment::GAP_STEPS;
@@ -7,7 +9,7 @@ use crate::segment::GAP_STEPS;
 /// How regularly messages came.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Pace {
-    /// One over the median step; zero with fewer than two messages.
+    /// One over the median step; where the stamps stand still between ticks, messages over time; zero with fewer than two messages.
     pub rate_hz: f64,
     /// Standard deviation of the steps that are no gaps.
     pub jitter_s: f64,
@@ -24,11 +26,25 @@ impl Pace {
     #[must_use]
     pub fn of(steps_s: impl IntoIterator<Item = f64>) -> Self {
         let mut steps_s: Vec<f64> = steps_s.into_iter().collect();
-        let middle = steps_s.len() / 2;
         if steps_s.is_empty() {
             return Self::default();
         }
-        let median_s = *steps_s.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let middle = steps_s.len() / 2;
+        let step_s = *steps_s.select_nth_unstable_by(middle, f64::total_cmp).1;
+        // A clock that ticks more slowly than messages come (`--use-sim-time`) gives many of them one stamp: its own ticks tell the gaps, and
+        // the messages' number their rate.
+        let coarse = step_s <= 0.0;
+        let total_s: f64 = steps_s.iter().sum();
+        let mut ticks_s: Vec<f64> = steps_s.iter().copied().filter(|&s| !coarse || s > 0.0).collect();
+        let middle = ticks_s.len() / 2;
+        let median_s =
+            if ticks_s.is_empty() { 0.0 } else { *ticks_s.select_nth_unstable_by(middle, f64::total_cmp).1 };
+        let rate_hz = match (coarse, median_s > 0.0) {
+            (_, false) => 0.0,
+            (true, true) => steps_s.len() as f64 / total_s,
+            (false, true) => 1.0 / median_s,
+        };
+        let steps_s = ticks_s;
         let is_gap = |step_s: f64| step_s > GAP_STEPS * median_s;
         let regular: Vec<f64> = steps_s.iter().copied().filter(|&s| !is_gap(s)).collect();
         let gaps: Vec<f64> = steps_s.iter().copied().filter(|&s| is_gap(s)).collect();
@@ -37,7 +53,7 @@ impl Pace {
         let missing = |lost: f64, step_s: &f64| lost + (step_s / median_s).round() - 1.0;
         let lost = if median_s > 0.0 { gaps.iter().fold(0.0, missing) } else { 0.0 };
         Self {
-            rate_hz: if median_s > 0.0 { 1.0 / median_s } else { 0.0 },
+            rate_hz,
             jitter_s: variance.sqrt(),
             gaps: gaps.len(),
             longest_step_s: steps_s.iter().copied().fold(0.0, f64::max),
@@ -66,20 +82,9 @@ impl Spikes {
     /// than a tenth of what 90 % of the values span.
     #[must_use]
     pub fn of(channel: &'static str, times_s: &[f64], values: &[f64]) -> Option<Self> {
-        const STEPS: f64 = 8.0;
-        const SPAN: f64 = 0.1;
-        let usual_step = quantile(values.windows(2).map(|w| (w[1] - w[0]).abs()), 0.9)?;
-        let span = quantile(values.iter().copied(), 0.95)? - quantile(values.iter().copied(), 0.05)?;
-        let least = (STEPS * usual_step).max(SPAN * span);
-        let height = |w: &[f64]| {
-            let (before, after) = (w[1] - w[0], w[1] - w[2]);
-            if before * after > 0.0 { before.abs().min(after.abs()) } else { 0.0 }
-        };
-        let found: Vec<(f64, f64)> = values
-            .windows(3)
-            .zip(times_s.iter().skip(1))
-            .map(|(w, &t)| (t, height(w)))
-            .filter(|s| s.1 > least)
+        let found: Vec<(f64, f64)> = spikes_at(values)
+            .into_iter()
+            .filter_map(|(k, height)| Some((*times_s.get(k)?, height)))
             .collect();
         let &(first_s, _) = found.first()?;
         let largest = found.iter().map(|s| s.1).fold(0.0, f64::max);
@@ -87,16 +92,37 @@ impl Spikes {
     }
 }
 
+/// Places of the samples that stand out, by the rule of [`Spikes::of`], and by how much.
+pub(crate) fn spikes_at(values: &[f64]) -> Vec<(usize, f64)> {
+    const STEPS: f64 = 8.0;
+    const SPAN: f64 = 0.1;
+    let steps = values.windows(2).map(|w| (w[1] - w[0]).abs());
+    let (Some(usual_step), Some(low), Some(high)) = (
+        quantile(steps, 0.9),
+        quantile(values.iter().copied(), 0.05),
+        quantile(values.iter().copied(), 0.95),
+    ) else {
+        return Vec::new();
+    };
+    let least = (STEPS * usual_step).max(SPAN * (high - low));
+    let height = |w: &[f64]| {
+        let (before, after) = (w[1] - w[0], w[1] - w[2]);
+        if before * after > 0.0 { before.abs().min(after.abs()) } else { 0.0 }
+    };
+    let all = values.windows(3).enumerate().map(|(k, w)| (k + 1, height(w)));
+    all.filter(|(_, height)| *height > least).collect()
+}
+
 /// The messages of a stream of telemetry.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TopicHealth {
-    /// The stream: `odom`, `drive`, `imu` or `wheels`.
+    /// The stream: `odom`, `drive`, `imu` or `wheels`; of a topic that is read field by field its first signal.
     pub stream: &'static str,
     /// Its topic; `None` (`null`) where it is not recorded.
     pub topic: Option<String>,
     /// Type of its messages.
     #[serde(rename = "type")]
-    pub type_name: &'static str,
+    pub type_name: Cow<'static, str>,
     /// Messages that say something.
     pub messages: usize,
     /// How regularly they were stamped.
@@ -138,6 +164,12 @@ mod tests {
         assert!(pace.gaps == 1 && (pace.longest_step_s - 0.11).abs() < 0.002);
         assert!((pace.lost_share - 10.0 / 110.0).abs() < 0.015, "{pace:?}");
         assert_eq!(Pace::of([]), Pace::default());
+        // 100 messages a second by a clock of 20 ticks, of which one is left out.
+        let ticks = (0..1000).map(|k| 0.05 * f64::from(k / 5)).filter(|t| (t - 25.0).abs() > 1e-9);
+        let ticks: Vec<f64> = ticks.collect();
+        let pace = Pace::of(ticks.windows(2).map(|w| w[1] - w[0]));
+        assert!((pace.rate_hz - 100.0).abs() < 1.0 && pace.gaps == 0, "{pace:?}");
+        assert_eq!(Pace::of([0.0, 0.0]).rate_hz, 0.0);
     }
 
     #[test]

@@ -33,8 +33,6 @@ fn not_a_bag() {
     let folder = TempDir::new().unwrap();
     assert!(matches!(Bag::open(folder.path()), Err(BagError::NotABag { .. })));
     for (metadata, why) in [
-        ("storage_identifier: sqlite3\n  relative_file_paths: [a.db3]", "sqlite3"),
-        ("storage_identifier: mcap\n  relative_file_paths: [a.mcap]\n  compression_mode: FILE", "FILE"),
         ("storage_identifier: mcap\n  relative_file_paths: []", "no file"),
         ("storage_identifier: [", "metadata.yaml"),
     ] {
@@ -260,16 +258,4 @@ fn what_cannot_be_written() {
     assert!(matches!(writer.write("/a", -1, &Clock::default()), Err(BagError::Write { .. })));
     writer.write("/a", 1, &Clock::default()).unwrap();
     assert!(matches!(writer.write("/a", 2, &encode::drive(&drive(0))), Err(BagError::Write { .. })));
-}
-
-/// `--topics` takes what the launchers take.
-#[test]
-fn every_stack_s_file_is_a_topics_file() {
-    let stacks = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../params/stacks");
-    let files: Vec<_> = std::fs::read_dir(stacks).unwrap().map(|file| file.unwrap().path()).collect();
-    assert!(files.len() >= 4);
-    for file in files {
-        let topics = TopicMap::read(&file).unwrap();
-        assert!(topics.odom.is_some() && topics.drive.is_some(), "{}", file.display());
-    }
 }

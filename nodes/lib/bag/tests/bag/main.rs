@@ -14,4 +14,5 @@ mod peers;
 mod recorded;
 mod round_trip;
 mod sequences;
+mod sqlite;
 mod support;

@@ -1,0 +1,240 @@
+//! Bad samples cost themselves, not the bag: what of a sequence is not to be used, and why.
+//!
+//! * A single sample of v_x, v_y or yaw rate that stands out ([`Spikes`]' rule) is left out; of an optional channel it is bridged by its neighbours.
+//! * A channel that repeats one value for over half a second while the car moves and then *jumps* was frozen: those samples are left out. One
+//!   that goes on from where it stood was constant (a simulator's cruise) or within its sensor's dead band, and stays.
+//! * A pose that jumps and stays is told; nothing is left out, since what uses poses uses their differences over short spans.
+//!
+//! Nothing is rescaled and nothing is invented: left out means a gap in the samples, as a lost message makes one. The result is a pure function of
+//! the sequence, so that live and offline agree.
+
+use serde::Serialize;
+
+use crate::health::{MOVING_MPS, still_spans};
+use crate::topic::spikes_at;
+use crate::{DataHealth, SignalError, StateSequence};
+
+/// Why samples are not used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BadKind {
+    /// A single sample that stands out from both its neighbours.
+    Outlier,
+    /// A sensor that repeated itself, and then jumped.
+    Frozen,
+    /// A localisation that jumped, and stayed there.
+    Jump,
+}
+
+/// Samples that are not used, or (a jump) not to be differenced across.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct BadSpan {
+    /// Which channel.
+    pub channel: &'static str,
+    /// Why.
+    pub kind: BadKind,
+    /// First sample, since the start of the sequence.
+    pub from_s: f64,
+    /// Last sample.
+    pub to_s: f64,
+    /// How far off, in the channel's unit.
+    pub size: f64,
+}
+
+/// A sequence without its bad samples.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Masked {
+    /// What is left.
+    pub sequence: StateSequence,
+    /// What is not, in the order of channels and time.
+    pub bad: Vec<BadSpan>,
+}
+
+/// A step of this many usual steps is a jump.
+const JUMP_STEPS: f64 = 8.0;
+/// Where more than this share of the samples would go, they are not single bad ones: nothing is left out.
+const MOST_SHARE: f64 = 0.2;
+
+/// Leaves bad samples out. A sequence without any comes back as it is.
+///
+/// # Errors
+/// What [`StateSequence::check`] finds.
+pub fn masked(sequence: &StateSequence) -> Result<Masked, SignalError> {
+    sequence.check()?;
+    let mut out = Masked { sequence: sequence.clone(), bad: Vec::new() };
+    let time_s: Vec<f64> = sequence.time_s.iter().map(|&t| f64::from(t)).collect();
+    let mut keep = vec![true; sequence.len()];
+    for (name, values) in [
+        ("v_x_mps", &sequence.v_x_mps),
+        ("v_y_mps", &sequence.v_y_mps),
+        ("yaw_rate_radps", &sequence.yaw_rate_radps),
+    ] {
+        let values: Vec<f64> = values.iter().map(|&v| f64::from(v)).collect();
+        for (k, size) in spikes_at(&values) {
+            keep[k] = false;
+            out.bad.push(BadSpan {
+                channel: name,
+                kind: BadKind::Outlier,
+                from_s: time_s[k],
+                to_s: time_s[k],
+                size,
+            });
+        }
+        let usual = usual_step(&values);
+        for (from, to) in still_spans(&time_s, &values, |k| sequence.v_x_mps[k].abs() > MOVING_MPS) {
+            let after = values.get(to + 1).map_or(0.0, |v| (v - values[to]).abs());
+            if after > JUMP_STEPS * usual && values[from] != 0.0 {
+                keep[from + 1..=to].fill(false);
+                out.bad.push(BadSpan {
+                    channel: name,
+                    kind: BadKind::Frozen,
+                    from_s: time_s[from],
+                    to_s: time_s[to],
+                    size: after,
+                });
+            }
+        }
+    }
+    let left_out = keep.iter().filter(|k| !**k).count();
+    if left_out as f64 > MOST_SHARE * sequence.len() as f64 {
+        keep.fill(true);
+        out.bad.clear();
+    }
+    bridge(&mut out, &time_s);
+    jumps(sequence, &mut out.bad);
+    out.sequence.retain(|k| keep[k]);
+    Ok(out)
+}
+
+/// Puts the mean of its neighbours where a single sample of an inertial unit or a wheel stands out.
+fn bridge(out: &mut Masked, time_s: &[f64]) {
+    let Masked { sequence, bad } = out;
+    for (name, values) in [
+        ("a_x_mps2", &mut sequence.a_x_mps2),
+        ("a_y_mps2", &mut sequence.a_y_mps2),
+        ("gyro_yaw_rate_radps", &mut sequence.gyro_yaw_rate_radps),
+        ("measured_steering_rad", &mut sequence.measured_steering_rad),
+        ("wheel_speed_fl_radps", &mut sequence.wheel_speed_fl_radps),
+        ("wheel_speed_fr_radps", &mut sequence.wheel_speed_fr_radps),
+        ("wheel_speed_rl_radps", &mut sequence.wheel_speed_rl_radps),
+        ("wheel_speed_rr_radps", &mut sequence.wheel_speed_rr_radps),
+    ] {
+        let wide: Vec<f64> = values.iter().map(|&v| f64::from(v)).collect();
+        let found = spikes_at(&wide);
+        if found.len() as f64 > MOST_SHARE * wide.len() as f64 {
+            continue;
+        }
+        for (k, size) in found {
+            values[k] = 0.5 * (values[k - 1] + values[k + 1]);
+            bad.push(BadSpan {
+                channel: name,
+                kind: BadKind::Outlier,
+                from_s: time_s[k],
+                to_s: time_s[k],
+                size,
+            });
+        }
+    }
+}
+
+/// Jumps of the pose: a step from pose to pose that no speed explains.
+fn jumps(sequence: &StateSequence, bad: &mut Vec<BadSpan>) {
+    let poses = sequence.poses();
+    let steps: Vec<f64> = (1..poses.time_s.len())
+        .map(|k| (poses.x_m[k] - poses.x_m[k - 1]).hypot(poses.y_m[k] - poses.y_m[k - 1]))
+        .collect();
+    let usual = usual_step(&steps).max(quantile(&steps, 0.9));
+    for (k, &step) in steps.iter().enumerate() {
+        if step > JUMP_STEPS * usual.max(0.01) {
+            let (from_s, to_s) = (poses.time_s[k], poses.time_s[k + 1]);
+            bad.push(BadSpan { channel: "x_m", kind: BadKind::Jump, from_s, to_s, size: step });
+        }
+    }
+}
+
+/// What 90 % of the steps from sample to sample stay below.
+fn usual_step(values: &[f64]) -> f64 {
+    let steps: Vec<f64> = values.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|s| *s > 0.0).collect();
+    quantile(&steps, 0.9)
+}
+
+fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut values = values.to_vec();
+    let Some(last) = values.len().checked_sub(1) else { return 0.0 };
+    *values.select_nth_unstable_by((last as f64 * share).round() as usize, f64::total_cmp).1
+}
+
+impl Masked {
+    /// The health of what is left.
+    ///
+    /// # Errors
+    /// As [`DataHealth::of`].
+    pub fn health(&self) -> Result<DataHealth, SignalError> {
+        DataHealth::of(&self.sequence)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drive() -> StateSequence {
+        let time_s: Vec<f32> = (0..1000).map(|k| k as f32 * 0.01).collect();
+        let wave = |f: f32| time_s.iter().map(|t| (f * t).sin()).collect::<Vec<_>>();
+        StateSequence {
+            v_x_mps: time_s.iter().map(|t| 5.0 + (0.3 * t).sin()).collect(),
+            v_y_mps: wave(3.0),
+            yaw_rate_radps: wave(2.0),
+            steering_rad: wave(1.0),
+            a_y_mps2: wave(4.0),
+            time_s,
+            ..Default::default()
+        }
+    }
+
+    #[test]
+    fn a_clean_sequence_comes_back_as_it_is() {
+        assert_eq!(masked(&drive()).unwrap(), Masked { sequence: drive(), bad: Vec::new() });
+    }
+
+    #[test]
+    fn what_froze_and_jumped_goes_and_what_was_constant_stays() {
+        let mut frozen = drive();
+        let stuck = frozen.v_y_mps[100];
+        frozen.v_y_mps[100..190].fill(stuck);
+        let out = masked(&frozen).unwrap();
+        assert_eq!((out.sequence.len(), out.bad.len(), out.bad[0].kind), (911, 1, BadKind::Frozen));
+        let mut cruise = drive();
+        cruise.v_x_mps.fill(5.0);
+        let band = |v: &f32| if v.abs() < 0.3 { 0.0 } else { v - 0.3 * v.signum() };
+        cruise.yaw_rate_radps = cruise.yaw_rate_radps.iter().map(band).collect();
+        for k in 400..500 {
+            cruise.v_x_mps[k] = 5.0 + 0.01 * (k - 400) as f32;
+        }
+        cruise.v_x_mps[500..].fill(6.0);
+        assert_eq!(masked(&cruise).unwrap().bad, Vec::new());
+    }
+
+    #[test]
+    fn single_samples_cost_themselves() {
+        let mut spiked = drive();
+        spiked.yaw_rate_radps[300] += 9.0;
+        spiked.a_y_mps2[500] = 80.0;
+        let out = masked(&spiked).unwrap();
+        assert_eq!(out.sequence.len(), 999);
+        assert!((out.sequence.a_y_mps2[499] - (4.0_f32 * 5.0).sin()).abs() < 0.01);
+        let kinds: Vec<_> = out.bad.iter().map(|b| (b.channel, b.kind)).collect();
+        assert_eq!(kinds, [("yaw_rate_radps", BadKind::Outlier), ("a_y_mps2", BadKind::Outlier)]);
+    }
+
+    #[test]
+    fn a_jump_of_the_localisation_is_told() {
+        let mut posed = drive();
+        posed.x_m = posed.time_s.iter().map(|t| 5.0 * t + if *t > 4.0 { 3.0 } else { 0.0 }).collect();
+        posed.y_m = vec![0.0; 1000];
+        posed.yaw_rad = vec![0.0; 1000];
+        let out = masked(&posed).unwrap();
+        assert_eq!((out.sequence.len(), out.bad.len(), out.bad[0].kind), (1000, 1, BadKind::Jump));
+        assert!((out.bad[0].from_s - 4.0).abs() < 0.02);
+    }
+}

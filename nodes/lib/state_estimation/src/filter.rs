@@ -1,0 +1,244 @@
+//! The filter: one step of time, one observation at a time.
+
+use nalgebra::{Matrix3, SMatrix, Vector3};
+use serde::Serialize;
+
+use crate::events::Observation;
+use crate::levels::Levels;
+use crate::state::{
+    A_X, A_Y, ALPHA, ARM, B_R, B_X, B_Y, Drive, LATE, Matrix, N, PSI, R, SCALE, V_X, V_Y, Vector, X, Y,
+    jacobian, rate, step,
+};
+
+/// v_x, v_y and yaw rate with their covariance.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Motion {
+    /// Since the start of the sequence.
+    pub time_s: f64,
+    /// Forward speed.
+    pub v_x_mps: f64,
+    /// Lateral speed, left positive, at the point of the poses.
+    pub v_y_mps: f64,
+    /// Yaw rate.
+    pub yaw_rate_radps: f64,
+    /// Covariance of the three.
+    pub covariance: [[f64; 3]; 3],
+}
+
+impl Motion {
+    pub(crate) fn of(time_s: f64, s: &Vector, p: &Matrix) -> Self {
+        const PLACES: [usize; 3] = [V_X, V_Y, R];
+        let covariance = PLACES.map(|i| PLACES.map(|j| p[(i, j)]));
+        Self { time_s, v_x_mps: s[V_X], v_y_mps: s[V_Y], yaw_rate_radps: s[R], covariance }
+    }
+
+    /// Standard deviation of v_y.
+    #[must_use]
+    pub fn v_y_sigma_mps(&self) -> f64 {
+        self.covariance[1][1].max(0.0).sqrt()
+    }
+}
+
+/// Of three numbers, 1 in 1000 chi-squared lies beyond; a pose further off is left out.
+const GATE_POSE: f64 = 16.27;
+/// Of one number, likewise.
+const GATE_ONE: f64 = 10.83;
+/// So many poses in a row that contradict are a jump of the localisation.
+const JUMP_POSES: usize = 4;
+
+/// The filter, live.
+#[derive(Debug, Clone)]
+pub struct Filter {
+    levels: Levels,
+    drive: Drive,
+    time_s: Option<f64>,
+    pub(crate) s: Vector,
+    pub(crate) p: Matrix,
+    contradicting: usize,
+    /// Times at which the localisation jumped.
+    pub(crate) jumps_s: Vec<f64>,
+    /// Observations left out.
+    pub(crate) left_out: usize,
+}
+
+impl Filter {
+    /// A filter that knows nothing yet but the levels of noise.
+    #[must_use]
+    pub fn new(levels: Levels) -> Self {
+        let mut spread = Vector::repeat(1e6);
+        for (place, sigma) in [
+            (PSI, 10.0),
+            (V_X, 100.0),
+            (V_Y, levels.v_y_spread_mps),
+            (R, 10.0),
+            (A_X, 20.0),
+            (A_Y, 20.0),
+            (ALPHA, 10.0),
+            // A cheap unit on a tilted plate; a gyroscope out of its box; an arm of the car's size; a speed's scale by wheel or gear.
+            (B_X, 0.5),
+            (B_Y, 0.5),
+            (B_R, 0.05),
+            (ARM, levels.arm_m),
+            (SCALE, 0.1),
+            (LATE, levels.late_s),
+        ] {
+            spread[place] = f64::powi(sigma, 2);
+        }
+        let drive = levels.drive();
+        Self {
+            levels,
+            drive,
+            time_s: None,
+            s: Vector::zeros(),
+            p: Matrix::from_diagonal(&spread),
+            contradicting: 0,
+            jumps_s: Vec::new(),
+            left_out: 0,
+        }
+    }
+
+    /// Goes on to a time; a time before the last changes nothing. Gives the transition for the way back.
+    pub(crate) fn advance(&mut self, time_s: f64) -> Matrix {
+        let dt_s = self.time_s.map_or(0.0, |t| time_s - t);
+        self.time_s = Some(self.time_s.map_or(time_s, |t| t.max(time_s)));
+        if dt_s <= 0.0 {
+            return Matrix::identity();
+        }
+        let (s, transition, noise) = step(&self.s, dt_s, &self.drive);
+        self.s = s;
+        self.p = transition * self.p * transition.transpose() + noise;
+        transition
+    }
+
+    /// Takes an observation at its time.
+    pub fn push(&mut self, time_s: f64, observation: &Observation) -> Motion {
+        self.advance(time_s);
+        self.observe(observation);
+        self.motion()
+    }
+
+    /// What is known now.
+    #[must_use]
+    pub fn motion(&self) -> Motion {
+        Motion::of(self.time_s.unwrap_or(0.0), &self.s, &self.p)
+    }
+
+    pub(crate) fn observe(&mut self, observation: &Observation) {
+        let l = self.levels;
+        let s = self.s;
+        let mut h = Vector::zeros();
+        match *observation {
+            Observation::Pose { x_m, y_m, yaw_rad } => self.pose(x_m, y_m, yaw_rad),
+            Observation::Speed(v_mps) => {
+                h[V_X] = 1.0 + s[SCALE];
+                h[SCALE] = s[V_X];
+                self.one(v_mps - (1.0 + s[SCALE]) * s[V_X], &h, l.v_x_mps);
+            }
+            Observation::LateralSpeed(v_mps) => {
+                h[V_Y] = 1.0;
+                self.one(v_mps - s[V_Y], &h, l.v_y_mps);
+            }
+            Observation::YawRate(r_radps) => {
+                h[R] = 1.0;
+                h[B_R] = 1.0;
+                self.one(r_radps - s[R] - s[B_R], &h, l.yaw_rate_radps);
+            }
+            Observation::Acceleration { a_x_mps2, a_y_mps2 } => {
+                h[A_X] = 1.0;
+                h[B_X] = 1.0;
+                h[R] = -2.0 * s[ARM] * s[R];
+                h[ARM] = -s[R] * s[R];
+                // A product of two unknowns is less certain than its slopes say: the second-order term counts as noise.
+                let product = 2.0 * s[R].abs() * self.product(ARM, R);
+                self.one(a_x_mps2 - (s[A_X] + s[B_X] - s[ARM] * s[R] * s[R]), &h, l.a_x_mps2.hypot(product));
+                let s = self.s;
+                let mut h = Vector::zeros();
+                h[A_Y] = 1.0;
+                h[B_Y] = 1.0;
+                h[ALPHA] = s[ARM];
+                h[ARM] = s[ALPHA];
+                let product = self.product(ARM, ALPHA);
+                self.one(a_y_mps2 - (s[A_Y] + s[B_Y] + s[ARM] * s[ALPHA]), &h, l.a_y_mps2.hypot(product));
+            }
+        }
+    }
+
+    /// Standard deviation of the second-order part of a product of two states.
+    fn product(&self, a: usize, b: usize) -> f64 {
+        (self.p[(a, a)] * self.p[(b, b)] + self.p[(a, b)].powi(2)).max(0.0).sqrt()
+    }
+
+    /// Takes one number by the row `h`.
+    fn one(&mut self, innovation: f64, h: &Vector, sigma: f64) {
+        let ph = self.p * h;
+        let variance = h.dot(&ph) + sigma * sigma;
+        if innovation * innovation > GATE_ONE * variance {
+            self.left_out += 1;
+            // What goes on contradicting is true: the more, the less is known of the motion's change.
+            for place in [A_X, A_Y, ALPHA] {
+                self.p[(place, place)] *= 1.5;
+            }
+            return;
+        }
+        let gain = ph / variance;
+        self.s += gain * innovation;
+        self.p -= gain * ph.transpose();
+        self.p = (self.p + self.p.transpose()) * 0.5;
+    }
+
+    fn pose(&mut self, x_m: f64, y_m: f64, yaw_rad: f64) {
+        let turns = ((self.s[PSI] - yaw_rad) / std::f64::consts::TAU).round();
+        // A pose that is later than was taken off says where the car was.
+        let late_s = self.s[LATE];
+        let moved = rate(&self.s);
+        let predicted = [X, Y, PSI].map(|place| self.s[place] - late_s * moved[place]);
+        let innovation = Vector3::new(
+            x_m - predicted[0],
+            y_m - predicted[1],
+            yaw_rad + turns * std::f64::consts::TAU - predicted[2],
+        );
+        let mut h: SMatrix<f64, 3, N> = -late_s * jacobian(&self.s).fixed_rows::<3>(0).into_owned();
+        for place in 0..3 {
+            h[(place, place)] += 1.0;
+            h[(place, LATE)] = -moved[place];
+        }
+        let noise = Matrix3::from_diagonal(&Vector3::new(
+            self.levels.position_m.powi(2),
+            self.levels.position_m.powi(2),
+            self.levels.heading_rad.powi(2),
+        ));
+        let columns = self.p * h.transpose();
+        let Some(inverse) = (h * columns + noise).try_inverse() else { return };
+        let distance = (innovation.transpose() * inverse * innovation)[0];
+        if distance > GATE_POSE {
+            self.left_out += 1;
+            self.contradicting += 1;
+            if self.contradicting < JUMP_POSES {
+                return;
+            }
+            self.begin_anew(x_m, y_m, self.s[PSI] + innovation[2]);
+            return;
+        }
+        self.contradicting = 0;
+        let gain = columns * inverse;
+        self.s += gain * innovation;
+        self.p -= gain * columns.transpose();
+        self.p = (self.p + self.p.transpose()) * 0.5;
+    }
+
+    /// The localisation has jumped: place and heading are what it says now, and the motion is what it was.
+    fn begin_anew(&mut self, x_m: f64, y_m: f64, yaw_rad: f64) {
+        self.contradicting = 0;
+        self.jumps_s.extend(self.time_s);
+        let values = [x_m, y_m, yaw_rad];
+        let sigmas = [self.levels.position_m, self.levels.position_m, self.levels.heading_rad];
+        for place in 0..3 {
+            self.s[place] = values[place];
+            for other in 0..N {
+                self.p[(place, other)] = 0.0;
+                self.p[(other, place)] = 0.0;
+            }
+            self.p[(place, place)] = sigmas[place].powi(2);
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! v_x, v_y and yaw rate with their covariance, where a stack does not measure them: from poses, inertial unit, gyroscope and speed.
+//!
+//! Free of any tire model: nothing but rigid-body kinematics in the plane, so that what it gives may be fitted tires to.
+//!
+//! ```text
+//! x' = v_x cos psi - v_y sin psi     v_x' = a_x + v_y r     a_x' = white noise
+//! y' = v_x sin psi + v_y cos psi     v_y' = a_y - v_x r     a_y' = white noise
+//! psi' = r                           r'   = alpha           alpha' = white noise
+//! ```
+//!
+//! with constants beside: biases of the accelerometers and of the gyroscope, the place of the inertial unit ahead of the point of the poses,
+//! and the scale of the speed. [`smooth`] runs an extended Kalman filter forward and a Rauch-Tung-Striebel smoother back (offline); [`Filter`] is
+//! the forward half alone (live). How strong the white noises are, and how noisy each sensor is, is taken from the recording itself
+//! ([`Levels`]). A pose that contradicts what is known by more than chance does is left out; where poses go on contradicting, the
+//! localisation has jumped, and position and heading begin anew. The delay of the poses is that at which their heading follows the integrated
+//! yaw rate best.
+//!
+//! Source of the smoother: Rauch, Tung, Striebel, AIAA Journal 3 (1965), 1445-1450.
+
+mod delay;
+mod error;
+mod events;
+mod filter;
+mod levels;
+mod smoother;
+mod state;
+
+pub use delay::pose_delay_s;
+pub use error::StateError;
+pub use events::{Observation, is_dead_reckoning};
+pub use filter::{Filter, Motion};
+pub use levels::Levels;
+pub use smoother::{Smoothed, filled, smooth};

@@ -1,0 +1,124 @@
+//! The state, its motion and its Jacobian.
+
+use nalgebra::{SMatrix, SVector};
+
+/// Size of the state.
+pub(crate) const N: usize = 15;
+pub(crate) type Vector = SVector<f64, N>;
+pub(crate) type Matrix = SMatrix<f64, N, N>;
+
+pub(crate) const X: usize = 0;
+pub(crate) const Y: usize = 1;
+pub(crate) const PSI: usize = 2;
+pub(crate) const V_X: usize = 3;
+pub(crate) const V_Y: usize = 4;
+pub(crate) const R: usize = 5;
+pub(crate) const A_X: usize = 6;
+pub(crate) const A_Y: usize = 7;
+pub(crate) const ALPHA: usize = 8;
+/// Biases of the accelerometers, m/s2, and of the yaw rate, rad/s.
+pub(crate) const B_X: usize = 9;
+pub(crate) const B_Y: usize = 10;
+pub(crate) const B_R: usize = 11;
+/// How far ahead of the point of the poses the inertial unit sits, m.
+pub(crate) const ARM: usize = 12;
+/// Scale of the speed: reported over true, less one.
+pub(crate) const SCALE: usize = 13;
+/// How much later poses are than their delay was taken to be, s.
+pub(crate) const LATE: usize = 14;
+
+/// Strengths of the white noises that drive a_x, a_y (m2/s5) and alpha (rad2/s5).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Drive {
+    pub(crate) a_x: f64,
+    pub(crate) a_y: f64,
+    pub(crate) alpha: f64,
+}
+
+/// The rate of change of the state.
+pub(crate) fn rate(s: &Vector) -> Vector {
+    let (sin, cos) = s[PSI].sin_cos();
+    let mut d = Vector::zeros();
+    d[X] = s[V_X] * cos - s[V_Y] * sin;
+    d[Y] = s[V_X] * sin + s[V_Y] * cos;
+    d[PSI] = s[R];
+    d[V_X] = s[A_X] + s[V_Y] * s[R];
+    d[V_Y] = s[A_Y] - s[V_X] * s[R];
+    d[R] = s[ALPHA];
+    d
+}
+
+/// Its Jacobian.
+pub(crate) fn jacobian(s: &Vector) -> Matrix {
+    let (sin, cos) = s[PSI].sin_cos();
+    let mut a = Matrix::zeros();
+    a[(X, PSI)] = -s[V_X] * sin - s[V_Y] * cos;
+    a[(X, V_X)] = cos;
+    a[(X, V_Y)] = -sin;
+    a[(Y, PSI)] = s[V_X] * cos - s[V_Y] * sin;
+    a[(Y, V_X)] = sin;
+    a[(Y, V_Y)] = cos;
+    a[(PSI, R)] = 1.0;
+    a[(V_X, A_X)] = 1.0;
+    a[(V_X, V_Y)] = s[R];
+    a[(V_X, R)] = s[V_Y];
+    a[(V_Y, A_Y)] = 1.0;
+    a[(V_Y, V_X)] = -s[R];
+    a[(V_Y, R)] = -s[V_X];
+    a[(R, ALPHA)] = 1.0;
+    a
+}
+
+/// State, transition and noise after a step: midpoint rule, transition to second order.
+pub(crate) fn step(s: &Vector, dt_s: f64, drive: &Drive) -> (Vector, Matrix, Matrix) {
+    let middle = s + rate(s) * (0.5 * dt_s);
+    let next = s + rate(&middle) * dt_s;
+    let a = jacobian(&middle) * dt_s;
+    let transition = Matrix::identity() + a + a * a * 0.5;
+    let mut noise = Matrix::zeros();
+    // An acceleration that walks makes a speed that walks along: the exact covariance of the pair.
+    for (rate, value, strength) in [(A_X, V_X, drive.a_x), (A_Y, V_Y, drive.a_y), (ALPHA, R, drive.alpha)] {
+        noise[(rate, rate)] = strength * dt_s;
+        noise[(value, value)] = strength * dt_s.powi(3) / 3.0;
+        noise[(rate, value)] = strength * dt_s * dt_s / 2.0;
+        noise[(value, rate)] = noise[(rate, value)];
+    }
+    (next, transition, noise)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_transition_is_the_derivative_of_the_step() {
+        let mut s = Vector::from_fn(|i, _| 0.3 + 0.17 * i as f64);
+        s[V_X] = 5.0;
+        let drive = Drive { a_x: 1.0, a_y: 1.0, alpha: 1.0 };
+        let (_, transition, _) = step(&s, 0.01, &drive);
+        for j in 0..N {
+            let mut up = s;
+            let mut down = s;
+            up[j] += 1e-6;
+            down[j] -= 1e-6;
+            let slope = (step(&up, 0.01, &drive).0 - step(&down, 0.01, &drive).0) / 2e-6;
+            for i in 0..N {
+                approx::assert_abs_diff_eq!(slope[i], transition[(i, j)], epsilon = 2e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn a_steady_circle_stays_one() {
+        let mut s = Vector::zeros();
+        s[V_X] = 4.0;
+        s[R] = 1.0;
+        s[A_Y] = 4.0;
+        for _ in 0..628 {
+            s = step(&s, 0.01, &Drive { a_x: 0.0, a_y: 0.0, alpha: 0.0 }).0;
+        }
+        approx::assert_abs_diff_eq!(s[V_X], 4.0, epsilon = 1e-3);
+        approx::assert_abs_diff_eq!(s[V_Y], 0.0, epsilon = 1e-3);
+        assert!(s[X].hypot(s[Y]) < 0.03);
+    }
+}
