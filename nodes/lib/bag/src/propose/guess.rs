@@ -33,6 +33,12 @@ pub(super) fn guesses(topics: &[Survey]) -> Vec<Guess> {
         .collect();
     found.sort_by_key(|g| (g.signal, g.rank));
     found.dedup_by_key(|g| g.signal);
+    // A pose is whole, and of one message; a lone `y` may be anything.
+    let topics: Vec<&str> =
+        found.iter().filter(|g| Signal::POSE.contains(&g.signal)).map(|g| g.topic.as_str()).collect();
+    if topics.len() != Signal::POSE.len() || topics.iter().any(|topic| *topic != topics[0]) {
+        found.retain(|g| !Signal::POSE.contains(&g.signal));
+    }
     found
 }
 

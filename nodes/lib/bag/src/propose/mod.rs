@@ -176,9 +176,11 @@ impl Lines {
         }
         self.mapped.push(guess.signal);
         self.comment(&format!("(?) by its name; {}", guess.why));
+        // A bracket means a list in YAML where no quotes stand around it.
+        let quote = if guess.path.contains('[') { "'" } else { "" };
         let _ = writeln!(
             self.text,
-            "{}: {{topic: {}, field: {}{}}}",
+            "{}: {{topic: {}, field: {quote}{}{quote}{}}}",
             guess.signal.name(),
             guess.topic,
             guess.path,

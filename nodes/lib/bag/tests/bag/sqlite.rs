@@ -147,7 +147,13 @@ const OWN: &str = "std_msgs/Header header\nbool on # comment\nfloat32 speed_kmh\
 fn own_topics(samples: usize) -> [Topic<'static>; 1] {
     let rows = (0..samples).map(|k| {
         let t = 0.01 * k as f64;
-        let data = own(k, 36.0, 10.0 * t.sin(), &["gyro", "wheel_fl"], &[0.5 * t.sin(), 33.0]);
+        let data = own(
+            k,
+            if k < 150 { 36.0 } else { 39.6 },
+            10.0 * t.sin(),
+            &["gyro", "wheel_fl"],
+            &[0.5 * t.sin(), 33.0],
+        );
         (stamp_ns(k) + 7_000_000, data)
     });
     [("/own", "car_msgs/msg/Own", rows.collect())]
