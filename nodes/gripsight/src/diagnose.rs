@@ -34,7 +34,7 @@ use crate::{Outcome, outputs};
 #[command(after_help = names())]
 pub(crate) struct DiagnoseArgs {
     /// An .mcap file or a rosbag2 folder.
-    bag: PathBuf,
+    pub(crate) bag: PathBuf,
     /// A later drive of the same car, to be compared with the first.
     bag2: Option<PathBuf>,
     /// Another drive of the car in the same state, to score on; without it every fourth block is held out.
@@ -42,25 +42,29 @@ pub(crate) struct DiagnoseArgs {
     heldout: Option<PathBuf>,
     /// The car, as a ROS 2 parameter file; without it, an F1TENTH-class 1:10 car.
     #[arg(long, value_name = "FILE")]
-    vehicle: Option<PathBuf>,
+    pub(crate) vehicle: Option<PathBuf>,
     /// The tires of the model: pacejka.yaml or <car>_pacejka.txt; trusted to a few percent.
     #[arg(long, value_name = "FILE", conflicts_with = "bag2")]
     pacejka: Option<PathBuf>,
     /// The model to start from: extended_model.yaml of an earlier diagnosis, its effects in place at their sizes; what is left is diagnosed.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["bag2", "pacejka"])]
     extended_model: Option<PathBuf>,
+    /// Your own simulator, as a YAML file that says how to start it: what in it differs from the car, and a patch of its parameter file
+    /// (DIR/simulator.patch). Effects may be left out by `--without`; its own parameters by `fixed` in the file.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["bag2", "pacejka", "extended_model", "heldout", "only", "predictions"])]
+    pub(crate) simulator: Option<PathBuf>,
     /// Leave an effect out of the library. May be repeated.
     #[arg(long, value_name = "EFFECT", value_parser = effects(), hide_possible_values = true)]
-    without: Vec<String>,
+    pub(crate) without: Vec<String>,
     /// Consider only this effect. May be repeated.
     #[arg(long, value_name = "EFFECT", value_parser = effects(), hide_possible_values = true, conflicts_with = "without")]
     only: Vec<String>,
     /// A file that maps names to topics, such as `odom: /car_state/odom`; without it topics are found by type.
     #[arg(long, value_name = "FILE")]
-    topics: Option<PathBuf>,
+    pub(crate) topics: Option<PathBuf>,
     /// Where the files go; made if it is not there.
     #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    pub(crate) out: PathBuf,
     /// Write the bag that is explained once more, with the predictions beside its topics: /gripsight/nominal/odom of the model as it came,
     /// /gripsight/extended/odom of the model with the effects found (open-loop rollouts of half a second, each from the recorded pose on).
     #[arg(long, value_name = "BAG")]
@@ -92,14 +96,17 @@ struct GapFile<'a> {
 }
 
 #[derive(Serialize)]
-struct Timing {
-    reading_s: f64,
-    diagnosing_s: f64,
-    total_s: f64,
+pub(crate) struct Timing {
+    pub(crate) reading_s: f64,
+    pub(crate) diagnosing_s: f64,
+    pub(crate) total_s: f64,
 }
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
+    if let Some(file) = &args.simulator {
+        return crate::simulator::run(args, file);
+    }
     let start = Instant::now();
     let bags: Vec<&Path> = [Some(&args.bag), args.bag2.as_ref(), args.heldout.as_ref()]
         .into_iter()
@@ -242,7 +249,7 @@ pub(crate) fn read(path: &Path, topics: &TopicMap) -> anyhow::Result<(StateSeque
     }
 }
 
-fn header(bag: &Path, vehicle: &VehicleParameters, sequence: &StateSequence) -> Header {
+pub(crate) fn header(bag: &Path, vehicle: &VehicleParameters, sequence: &StateSequence) -> Header {
     let stem = || bag.file_stem().map(|s| s.to_string_lossy().into_owned());
     Header {
         car: vehicle.name.clone().or_else(stem).unwrap_or_else(|| "car".into()),

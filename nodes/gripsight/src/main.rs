@@ -19,6 +19,7 @@ mod notes;
 mod outputs;
 mod predictions;
 mod simulate;
+mod simulator;
 mod verify;
 mod withheld;
 

@@ -4,7 +4,7 @@
 //! inside it. Colours have fixed [`Role`]s in every picture.
 //!
 //! [`identification_page`] shows the result of an identification, [`gap_page`] that of a diagnosis ([`gap_text`] says the same on a terminal),
-//! [`withheld_page`] the score of the blind check. They are built of [`Chart`]s,
+//! [`simulator_page`] that of one with the user's own simulator, [`withheld_page`] the score of the blind check. They are built of [`Chart`]s,
 //! bars and tables; nothing here computes what is not only for the eye.
 
 mod bars;
@@ -15,6 +15,7 @@ mod health;
 mod identification;
 mod page;
 mod role;
+mod simulator;
 pub mod text;
 mod topics;
 mod withheld;
@@ -25,5 +26,6 @@ pub use gap::{GapInput, gap_page, gap_text};
 pub use identification::{IdentificationInput, identification_page};
 pub use page::Header;
 pub use role::Role;
+pub use simulator::{PatchSaid, SimulatorInput, simulator_page, simulator_text};
 pub use topics::{TopicUse, topic_notes, topic_uses};
 pub use withheld::{WithheldInput, withheld_page};

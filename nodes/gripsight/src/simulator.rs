@@ -1,0 +1,137 @@
+//! `gripsight diagnose --simulator`: what makes the user's own simulator unlike the car.
+
+use std::fs;
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::Context;
+use gripsight_bag::TopicMap;
+use gripsight_report::{PatchSaid, SimulatorInput, TopicUse, simulator_page, simulator_text, topic_uses};
+use gripsight_simulator::{
+    Commands, Question, Roll as _, Simulator, SimulatorDiagnosis, SimulatorFile, diagnose, held_out_error,
+    patch,
+};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+use crate::diagnose::{DiagnoseArgs, Timing, header, read, vehicle};
+use crate::notes::read_notes;
+use crate::{Outcome, outputs};
+
+const PATCH_FILE: &str = "simulator.patch";
+
+/// gap.json: the diagnosis, the patch's verification, and what both rest on.
+#[derive(Serialize)]
+struct GapFile<'a> {
+    #[serde(flatten)]
+    diagnosis: &'a SimulatorDiagnosis,
+    patch: PatchFile<'a>,
+    topics: Vec<TopicUse<'a>>,
+    data_notes: &'a [String],
+}
+
+#[derive(Serialize)]
+struct PatchFile<'a> {
+    written: bool,
+    verified: Option<f64>,
+    by_hand: &'a [String],
+}
+
+/// Runs `diagnose` with a simulator.
+pub(crate) fn run(args: &DiagnoseArgs, simulator_file: &Path) -> anyhow::Result<Outcome> {
+    let start = Instant::now();
+    outputs::check(&args.out, &["gap.json", "report.html", "timing.json", PATCH_FILE], None, &[&args.bag])?;
+    let topics = args.topics.as_deref().map(TopicMap::read).transpose()?.unwrap_or_default();
+    let vehicle = vehicle(args.vehicle.as_deref())?;
+    let file = SimulatorFile::read(simulator_file)?;
+    let (sequence, report) = read(&args.bag, &topics)?;
+    let commands = Commands::of(&sequence);
+    let reading_s = start.elapsed().as_secs_f64();
+    let simulator = Simulator::start(&file)?;
+    let spinner =
+        ProgressBar::new_spinner().with_style(ProgressStyle::with_template("{spinner} {msg} {elapsed}")?);
+    let mut progress = |stage: &str| {
+        spinner.set_message(stage.to_owned());
+        spinner.tick();
+        tracing::debug!("{stage}");
+    };
+    let question = Question { file: &file, sequence: &sequence, commands, without: &args.without };
+    let result = diagnose(&simulator, &question, &mut progress)
+        .with_context(|| format!("cannot diagnose {}", args.bag.display()))?;
+    progress("the patched simulator");
+    let said = patched(&file, &simulator, &question, &result)?;
+    spinner.finish_and_clear();
+    let diagnosing_s = start.elapsed().as_secs_f64() - reading_s;
+    let notes = read_notes(&report);
+    let header = header(&args.bag, &vehicle, &sequence);
+    let page = simulator_page(&SimulatorInput {
+        diagnosis: &result,
+        patch: &said,
+        header: &header,
+        data_notes: &notes,
+    })?;
+    let gap = GapFile {
+        diagnosis: &result,
+        patch: PatchFile { written: !said.diff.is_empty(), verified: said.verified, by_hand: &said.by_hand },
+        topics: topic_uses(&report.topics),
+        data_notes: &notes,
+    };
+    let timing = Timing { reading_s, diagnosing_s, total_s: start.elapsed().as_secs_f64() };
+    let mut files = vec![
+        ("gap.json", serde_json::to_string_pretty(&gap)? + "\n"),
+        ("report.html", page),
+        ("timing.json", serde_json::to_string_pretty(&timing)? + "\n"),
+    ];
+    if !said.diff.is_empty() {
+        files.push((PATCH_FILE, said.diff.clone()));
+    }
+    for (name, text) in &files {
+        let path = args.out.join(name);
+        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    print!("{}", simulator_text(&result, &said, &notes));
+    let names: Vec<&str> = files.iter().map(|f| f.0).collect();
+    println!("files      {} ({})", args.out.display(), names.join(", "));
+    Ok(Outcome::Done)
+}
+
+/// The patch of the parameter file, and what the simulator that reads it says of held-out data. One that makes these worse is not given.
+fn patched(
+    file: &SimulatorFile,
+    simulator: &Simulator,
+    question: &Question<'_>,
+    result: &SimulatorDiagnosis,
+) -> anyhow::Result<PatchSaid> {
+    let found = patch(file, simulator.description(), &result.changes)?;
+    let Some(found) = found else { return Ok(PatchSaid::default()) };
+    let mut said = PatchSaid { by_hand: found.by_hand.clone(), ..PatchSaid::default() };
+    let Some(path) = file.parameter_path().filter(|_| !found.changed.is_empty()) else { return Ok(said) };
+    // Beside a copy of its neighbours: a parameter file may name others.
+    let copy = tempfile::tempdir().context("cannot make a temporary folder")?;
+    let parent = path.parent().unwrap_or(Path::new("."));
+    copy_files(parent, copy.path()).with_context(|| format!("cannot copy {}", parent.display()))?;
+    let name = path.file_name().context("the parameter file has no name")?;
+    fs::write(copy.path().join(name), &found.text).context("cannot write the patched parameters")?;
+    let patched = Simulator::start_with(file, Some(&copy.path().join(name)))
+        .context("cannot start the simulator with the patched parameters")?;
+    let error = held_out_error(&patched, question, &result.fitted)?;
+    said.verified = Some(error);
+    said.is_worse = error >= result.gap.nominal.value;
+    if !said.is_worse {
+        said.diff = found.diff;
+    }
+    Ok(said)
+}
+
+/// Copies a folder's own files; large ones are no parameters.
+fn copy_files(from: &Path, to: &Path) -> std::io::Result<()> {
+    const MOST_BYTES: u64 = 1 << 20;
+    for entry in fs::read_dir(from)? {
+        let entry = entry?;
+        let about = entry.metadata()?;
+        if about.is_file() && about.len() <= MOST_BYTES {
+            fs::copy(entry.path(), to.join(entry.file_name()))?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,266 @@
+//! Gauss-Newton on a simulator: derivatives are rollouts, so none is wasted.
+
+use nalgebra::DVector;
+
+use crate::SimulatorError;
+use crate::linear::{Layout, Normal, Starts, student_95, window_costs};
+use crate::model::{Model, Point, Residuals};
+
+/// A point, with what the simulator says there.
+#[derive(Debug, Clone)]
+pub(crate) struct State {
+    pub(crate) point: Point,
+    pub(crate) residuals: Residuals,
+    pub(crate) starts: Starts,
+    pub(crate) projected: Residuals,
+    shifts: Vec<DVector<f64>>,
+    pub(crate) costs: Vec<f64>,
+}
+
+/// A fit of some candidates.
+#[derive(Debug, Clone)]
+pub(crate) struct Fitted {
+    pub(crate) state: State,
+    /// The candidates fitted, with 90 % interval and the square of size over standard error; in their order.
+    pub(crate) sizes: Vec<Size>,
+}
+
+/// A fitted size.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Size {
+    pub(crate) candidate: usize,
+    pub(crate) value: f64,
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+    /// Square of the distance from the null over the standard error.
+    pub(crate) wald: f64,
+}
+
+impl State {
+    fn new(layout: &Layout, point: Point, residuals: Residuals, starts: Starts) -> Self {
+        let (projected, shifts) = starts.project(layout, &residuals);
+        let costs = window_costs(layout, &projected);
+        Self { point, residuals, starts, projected, shifts, costs }
+    }
+
+    /// Cost of the training windows.
+    pub(crate) fn training(&self, layout: &Layout) -> f64 {
+        layout.training().map(|w| self.costs[w]).sum()
+    }
+
+    /// Cost of the windows that are only scored.
+    pub(crate) fn held_out(&self, layout: &Layout) -> f64 {
+        (0..self.costs.len()).filter(|&w| layout.held_out[w]).map(|w| self.costs[w]).sum()
+    }
+
+    /// Another point, with the starts as the derivatives say that they follow; `moved`: how far residuals move that way.
+    fn moved(&self, layout: &Layout, values: Vec<f64>, moved: &Residuals) -> Point {
+        let (_, extra) = self.starts.project(layout, moved);
+        let shift = |x: &Vec<f64>, a: &DVector<f64>, b: &DVector<f64>| {
+            x.iter().zip(a.iter().zip(b.iter())).map(|(x, (a, b))| x + a + b).collect()
+        };
+        let starts = self.point.starts.iter().zip(self.shifts.iter().zip(&extra));
+        Point { values, starts: starts.map(|(x, (a, b))| shift(x, a, b)).collect() }
+    }
+}
+
+/// The problem: a model, and where its windows lie.
+pub(crate) struct Fitter<'a> {
+    pub(crate) model: &'a Model<'a>,
+    pub(crate) layout: Layout,
+}
+
+impl<'a> Fitter<'a> {
+    pub(crate) fn new(model: &'a Model<'a>) -> Self {
+        let mut at = 0;
+        let windows = model.drive.windows.iter().map(|w| {
+            let len = model.window_len(w);
+            at += len;
+            (at - len, len)
+        });
+        let layout = Layout {
+            windows: windows.collect(),
+            held_out: model.drive.windows.iter().map(|w| w.held_out).collect(),
+            block: model.drive.windows.iter().map(|w| w.block).collect(),
+        };
+        Self { model, layout }
+    }
+
+    /// The simulator at a point, its starts fitted.
+    pub(crate) fn at(&self, point: Point) -> Result<State, SimulatorError> {
+        let first = self.around(point, None, &[])?.0;
+        let none = vec![0.0; first.residuals.len()];
+        let point = first.moved(&self.layout, first.point.values.clone(), &none);
+        Ok(self.around(point, None, &[])?.0)
+    }
+
+    /// The derivatives by the starts and by some candidates, projected, at a point; the residuals there where they are known.
+    pub(crate) fn around(
+        &self,
+        point: Point,
+        known: Option<Residuals>,
+        candidates: &[usize],
+    ) -> Result<(State, Vec<Residuals>), SimulatorError> {
+        let model = self.model;
+        let mut points = Vec::new();
+        if known.is_none() {
+            points.push(point.clone());
+        }
+        let ahead = points.len();
+        for (f, (_, _, small)) in model.free.iter().enumerate() {
+            let mut other = point.clone();
+            other.starts.iter_mut().for_each(|x| x[f] += small);
+            points.push(other);
+        }
+        let steps: Vec<f64> = candidates.iter().map(|&c| self.step(c, point.values[c])).collect();
+        for (&c, step) in candidates.iter().zip(&steps) {
+            let mut other = point.clone();
+            other.values[c] += step;
+            points.push(other);
+        }
+        let mut results = model.residuals(&points)?;
+        let base = known.unwrap_or_else(|| results[0].clone());
+        if let Some(at) = base.iter().position(|r| !r.is_finite()) {
+            return Err(self.not_finite(at));
+        }
+        let rest = results.split_off(ahead);
+        let derivative = |r: &Residuals, step: f64| -> Residuals {
+            r.iter().zip(&base).map(|(a, b)| if a.is_finite() { (a - b) / step } else { 0.0 }).collect()
+        };
+        let count = model.free.len();
+        let by_start: Vec<Residuals> =
+            rest[..count].iter().zip(&model.free).map(|(r, (_, _, small))| derivative(r, *small)).collect();
+        let starts = Starts::new(&self.layout, &by_start);
+        let columns = rest[count..].iter().zip(&steps).map(|(r, step)| derivative(r, *step)).collect();
+        Ok((State::new(&self.layout, point, base, starts), columns))
+    }
+
+    /// The small change that a derivative is taken over: away from a bound.
+    fn step(&self, candidate: usize, value: f64) -> f64 {
+        let c = &self.model.candidates[candidate];
+        let step = c.step.min(0.5 * (c.high - c.low));
+        if value + step > c.high { -step } else { step }
+    }
+
+    fn not_finite(&self, at: usize) -> SimulatorError {
+        let w = self.layout.windows.iter().position(|(from, len)| (*from..from + len).contains(&at));
+        let drive = self.model.drive;
+        let window = drive.windows[w.unwrap_or(0)];
+        let channels = drive.channels.len();
+        let (from, _) = self.layout.windows[w.unwrap_or(0)];
+        let sample = window.from + (at - from) / channels;
+        SimulatorError::Answer {
+            when: "in a rollout with its own parameters",
+            why: format!(
+                "{} is not finite at {:.2} s of the recording",
+                drive.channels[(at - from) % channels].0.name(),
+                drive.stretches[window.stretch].segment.time_s(sample)
+            ),
+        }
+    }
+
+    /// Evaluates values of candidates around a state, starts following the derivatives (`columns`, of the candidates given).
+    pub(crate) fn trials(
+        &self,
+        state: &State,
+        columns: &[(usize, &Residuals)],
+        values: &[Vec<f64>],
+    ) -> Result<Vec<State>, SimulatorError> {
+        let points: Vec<Point> = values
+            .iter()
+            .map(|values| {
+                let mut moved = vec![0.0; state.residuals.len()];
+                for (c, column) in columns {
+                    let change = values[*c] - state.point.values[*c];
+                    if change != 0.0 {
+                        moved.iter_mut().zip(column.iter()).for_each(|(m, d)| *m += change * d);
+                    }
+                }
+                state.moved(&self.layout, values.clone(), &moved)
+            })
+            .collect();
+        let results = self.model.residuals(&points)?;
+        Ok(points
+            .into_iter()
+            .zip(results)
+            .map(|(point, r)| State::new(&self.layout, point, r, state.starts.clone()))
+            .collect())
+    }
+
+    /// Fits some candidates together, from a state on.
+    pub(crate) fn fit(
+        &self,
+        from: &State,
+        active: &[usize],
+        iterations: usize,
+    ) -> Result<Fitted, SimulatorError> {
+        const TOLERANCE: f64 = 1e-3;
+        let layout = &self.layout;
+        let known = Some(from.residuals.clone());
+        let (mut state, mut columns) = self.around(from.point.clone(), known, active)?;
+        let mut damping = 1e-3;
+        for iteration in 0..iterations {
+            let projected: Vec<Residuals> =
+                columns.iter().map(|c| state.starts.project(layout, c).0).collect();
+            let normal = Normal::new(layout, &state.projected, &projected.iter().collect::<Vec<_>>());
+            let pairs: Vec<(usize, &Residuals)> = active.iter().copied().zip(&columns).collect();
+            let trial = |damping: f64| {
+                normal.step(damping).map(|step| {
+                    let mut values = state.point.values.clone();
+                    active
+                        .iter()
+                        .zip(step.iter())
+                        .for_each(|(&c, s)| values[c] = self.within(c, values[c] + s));
+                    values
+                })
+            };
+            let tried: Vec<Vec<f64>> =
+                [damping, 30.0 * damping + 0.3].into_iter().filter_map(trial).collect();
+            let trials = self.trials(&state, &pairs, &tried)?;
+            let costs: Vec<f64> = trials.iter().map(|t| t.training(layout)).collect();
+            let Some(best) = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])) else { break };
+            let before = state.training(layout);
+            if costs[best].is_nan() || costs[best] >= before {
+                if damping > 10.0 {
+                    break;
+                }
+                damping = 100.0 * damping + 1.0;
+                continue;
+            }
+            damping = if best == 0 { 0.1 * damping } else { 3.0 * damping };
+            let taken = trials.into_iter().nth(best).unwrap_or_else(|| state.clone());
+            let done = (before - costs[best]) / before.max(f64::MIN_POSITIVE) < TOLERANCE;
+            if done || iteration + 1 == iterations {
+                state = taken;
+                break;
+            }
+            let residuals = taken.residuals.clone();
+            (state, columns) = self.around(taken.point, Some(residuals), active)?;
+        }
+        let sizes = self.sizes(&state, active, &columns);
+        Ok(Fitted { state, sizes })
+    }
+
+    pub(crate) fn within(&self, candidate: usize, value: f64) -> f64 {
+        let c = &self.model.candidates[candidate];
+        value.clamp(c.low, c.high)
+    }
+
+    fn sizes(&self, state: &State, active: &[usize], columns: &[Residuals]) -> Vec<Size> {
+        let projected: Vec<Residuals> =
+            columns.iter().map(|c| state.starts.project(&self.layout, c).0).collect();
+        let normal = Normal::new(&self.layout, &state.projected, &projected.iter().collect::<Vec<_>>());
+        let known = normal.covariance();
+        let size = |(place, &c): (usize, &usize)| {
+            let value = state.point.values[c];
+            let null = self.model.candidates[c].null;
+            let (error, freedom) = known.as_ref().map_or((f64::INFINITY, 1.0), |(cov, freedom)| {
+                (cov[(place, place)].max(0.0).sqrt(), *freedom)
+            });
+            let reach = student_95(freedom) * error;
+            let wald = if error > 0.0 { ((value - null) / error).powi(2) } else { 0.0 };
+            Size { candidate: c, value, low: value - reach, high: value + reach, wald }
+        };
+        active.iter().enumerate().map(size).collect()
+    }
+}

@@ -1,0 +1,216 @@
+//! Residuals with the start of every window eliminated, and least squares on them.
+//!
+//! ```text
+//! minimise over theta, x_w:  sum_w n_w rho(|r_w|^2 / n_w),   rho(s) = 2 k^2 (sqrt(1 + s/k^2) - 1)
+//! P_w = I - A_w (A_w' A_w)^-1 A_w',   A_w = d r_w / d x_w:   what no start of the window can explain
+//! ```
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::model::Residuals;
+
+/// Robustness: a window whose error per residual is above this counts by its size, not by its square.
+const ROBUST_K: f64 = 3.0;
+/// Most clusters of windows: enough for the rank of a covariance, few enough to outlast a corner.
+const CLUSTERS: usize = 40;
+
+/// Where the residuals of each window lie, and whether it is only scored.
+#[derive(Debug, Clone)]
+pub(crate) struct Layout {
+    pub(crate) windows: Vec<(usize, usize)>,
+    pub(crate) held_out: Vec<bool>,
+    pub(crate) block: Vec<usize>,
+}
+
+impl Layout {
+    /// Windows that are fitted.
+    pub(crate) fn training(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.windows.len()).filter(|&w| !self.held_out[w])
+    }
+
+    /// The cluster of each training window, in their order, and how many there are.
+    fn clusters(&self) -> (Vec<usize>, usize) {
+        let count = self.training().count();
+        let each = count.div_ceil(CLUSTERS).max(1);
+        ((0..count).map(|k| k / each).collect(), count.div_ceil(each))
+    }
+}
+
+/// How the starts of the windows act.
+#[derive(Debug, Clone)]
+pub(crate) struct Starts {
+    /// By window: d r / d x (n x F), and the inverse of its square.
+    blocks: Vec<(DMatrix<f64>, DMatrix<f64>)>,
+}
+
+impl Starts {
+    /// Of derivatives by each free state, every window's in one vector.
+    pub(crate) fn new(layout: &Layout, columns: &[Residuals]) -> Self {
+        let blocks = layout.windows.iter().map(|&(from, len)| {
+            let a = DMatrix::from_fn(len, columns.len(), |i, f| columns[f][from + i]);
+            let mut square = a.transpose() * &a;
+            for f in 0..columns.len() {
+                square[(f, f)] += 1e-12 + 1e-9 * square[(f, f)];
+            }
+            let inverse =
+                square.try_inverse().unwrap_or_else(|| DMatrix::zeros(columns.len(), columns.len()));
+            (a, inverse)
+        });
+        Self { blocks: blocks.collect() }
+    }
+
+    /// What no start explains of a vector, and by how much each window's start must move to explain the rest.
+    pub(crate) fn project(&self, layout: &Layout, v: &[f64]) -> (Residuals, Vec<DVector<f64>>) {
+        let mut out = v.to_vec();
+        let mut shifts = Vec::with_capacity(self.blocks.len());
+        for (&(from, len), (a, inverse)) in layout.windows.iter().zip(&self.blocks) {
+            if a.ncols() == 0 {
+                shifts.push(DVector::zeros(0));
+                continue;
+            }
+            let part = DVector::from_column_slice(&v[from..from + len]);
+            let shift = -(inverse * (a.transpose() * &part));
+            let left = part + a * &shift;
+            out[from..from + len].copy_from_slice(left.as_slice());
+            shifts.push(shift);
+        }
+        (out, shifts)
+    }
+}
+
+/// Cost of every window.
+pub(crate) fn window_costs(layout: &Layout, projected: &[f64]) -> Vec<f64> {
+    layout
+        .windows
+        .iter()
+        .map(|&(from, len)| {
+            let square: f64 = projected[from..from + len].iter().map(|r| r * r).sum();
+            if square.is_finite() { loss(square, len).0 } else { f64::INFINITY }
+        })
+        .collect()
+}
+
+/// Squares of every window: for stating errors.
+pub(crate) fn window_squares(layout: &Layout, projected: &[f64]) -> Vec<f64> {
+    layout
+        .windows
+        .iter()
+        .map(|&(from, len)| projected[from..from + len].iter().map(|r| r * r).sum())
+        .collect()
+}
+
+/// n rho(s/n), and the weight rho'(s/n).
+fn loss(square: f64, n: usize) -> (f64, f64) {
+    let root = (1.0 + square / n.max(1) as f64 / (ROBUST_K * ROBUST_K)).sqrt();
+    (n as f64 * 2.0 * ROBUST_K * ROBUST_K * (root - 1.0), root.recip())
+}
+
+/// The least squares problem around a point.
+#[derive(Debug)]
+pub(crate) struct Normal {
+    pub(crate) information: DMatrix<f64>,
+    pub(crate) gradient: DVector<f64>,
+    cluster_gradients: Vec<DVector<f64>>,
+}
+
+impl Normal {
+    /// Of projected residuals and the projected derivatives of each parameter, on the training windows.
+    pub(crate) fn new(layout: &Layout, projected: &[f64], columns: &[&Residuals]) -> Self {
+        let p = columns.len();
+        let (clusters, count) = layout.clusters();
+        let mut information = DMatrix::zeros(p, p);
+        let mut cluster_gradients = vec![DVector::zeros(p); count];
+        for (w, cluster) in layout.training().zip(clusters) {
+            let (from, len) = layout.windows[w];
+            let r = &projected[from..from + len];
+            let square: f64 = r.iter().map(|v| v * v).sum();
+            if !square.is_finite() {
+                continue;
+            }
+            let weight = loss(square, len).1;
+            for (a, column) in columns.iter().enumerate() {
+                let ca = &column[from..from + len];
+                cluster_gradients[cluster][a] += weight * dot(ca, r);
+                for (b, other) in columns.iter().enumerate().take(a + 1) {
+                    let sum = weight * dot(ca, &other[from..from + len]);
+                    information[(a, b)] += sum;
+                    if a != b {
+                        information[(b, a)] += sum;
+                    }
+                }
+            }
+        }
+        let gradient = cluster_gradients.iter().fold(DVector::zeros(p), |sum, g| sum + g);
+        Self { information, gradient, cluster_gradients }
+    }
+
+    /// The step that lowers the cost most as far as the derivatives reach, damped by a share of each parameter's own information.
+    pub(crate) fn step(&self, damping: f64) -> Option<DVector<f64>> {
+        let mut h = self.information.clone();
+        for a in 0..h.nrows() {
+            h[(a, a)] += damping * h[(a, a)] + 1e-12;
+        }
+        let step = -h.cholesky()?.solve(&self.gradient);
+        step.iter().all(|v| v.is_finite()).then_some(step)
+    }
+
+    /// What a step gains as far as the derivatives reach.
+    pub(crate) fn gain(&self, step: &DVector<f64>) -> f64 {
+        -(2.0 * self.gradient.dot(step) + (step.transpose() * &self.information * step)[(0, 0)])
+    }
+
+    /// Covariance robust to errors that hold on over a cluster (a sandwich), and its degrees of freedom.
+    pub(crate) fn covariance(&self) -> Option<(DMatrix<f64>, f64)> {
+        let p = self.gradient.len();
+        let inverse = self.information.clone().cholesky()?.inverse();
+        let count = self.cluster_gradients.len() as f64;
+        // At an optimum the sum is nothing; what is left of it, where a bound or the tolerance stopped, is not spread.
+        let mean = &self.gradient / count;
+        let meat = self.cluster_gradients.iter().fold(DMatrix::zeros(p, p), |sum, g| {
+            let g = g - &mean;
+            sum + &g * g.transpose()
+        });
+        let freedom = (count - p as f64).max(1.0);
+        // Neither can errors be less than the noise, which is known.
+        let robust = &inverse * meat * &inverse * (count / freedom);
+        let floor =
+            DMatrix::from_diagonal(&DVector::from_fn(p, |a, _| (inverse[(a, a)] - robust[(a, a)]).max(0.0)));
+        Some((robust + floor, freedom))
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// Student's t at 95 % (one side) for so many degrees of freedom: Cornish-Fisher's expansion, within 1 % from 3 on.
+pub(crate) fn student_95(freedom: f64) -> f64 {
+    const Z: f64 = 1.644_853_6;
+    let (z3, z5) = (Z.powi(3), Z.powi(5));
+    Z + (z3 + Z) / (4.0 * freedom) + (5.0 * z5 + 16.0 * z3 + 3.0 * Z) / (96.0 * freedom.powi(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn starts_take_what_they_explain_and_no_more() {
+        let layout = Layout { windows: vec![(0, 4), (4, 4)], held_out: vec![false; 2], block: vec![0, 0] };
+        let column = vec![1.0, 0.5, 0.25, 0.125, 2.0, 1.0, 0.5, 0.25];
+        let starts = Starts::new(&layout, &[column.clone()]);
+        let v: Vec<f64> = column.iter().enumerate().map(|(i, c)| if i < 4 { 3.0 * c } else { -c }).collect();
+        let (left, shifts) = starts.project(&layout, &v);
+        assert!(left.iter().all(|r| r.abs() < 1e-6));
+        approx::assert_relative_eq!(shifts[0][0], -3.0, max_relative = 1e-6);
+        let (again, _) = starts.project(&layout, &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        assert!(again[0].abs() < 1.0 && again[1] < 0.0 && again[5] == 0.0);
+    }
+
+    #[test]
+    fn students_t_is_as_tabled() {
+        for (freedom, t) in [(5.0, 2.015), (10.0, 1.812), (30.0, 1.697)] {
+            approx::assert_relative_eq!(student_95(freedom), t, max_relative = 0.01);
+        }
+    }
+}

@@ -1,0 +1,52 @@
+use super::*;
+use crate::test_car::TestCar;
+use crate::{Channel, Drive, Model, Roll as _, SimulatorFile, candidates};
+
+fn found(changed: &[(usize, f64)], seed: u64) -> (Vec<(String, f64, f64, f64)>, usize, f64) {
+    let car = TestCar::new();
+    let (sequence, commands) = car.recorded(changed, 40.0, seed);
+    let file = SimulatorFile::parse("command: [none]", std::env::temp_dir().as_path()).unwrap();
+    let drive = Drive::new(&sequence, commands, &[Channel::VYMps, Channel::YawRateRadps]).unwrap();
+    let list = candidates(car.description(), &file, &drive.channels, true, &[]);
+    let model = Model::new(&car, &file, &drive, &list, true);
+    let fitter = Fitter::new(&model);
+    let found = fitter.search(&mut |_| ()).unwrap();
+    let sizes = found.fits.last().map(|f| f.sizes.clone()).unwrap_or_default();
+    let named = sizes.iter().map(|s| (list[s.candidate].name.clone(), s.value, s.low, s.high)).collect();
+    let left = found.state().held_out(&fitter.layout);
+    (named, car.passes(), left)
+}
+#[test]
+fn one_change_is_found_with_its_size() {
+    for (name, place, value) in [
+        ("simulator.c_front", 0, 48.0),
+        ("simulator.grip", 2, 7.0),
+        ("simulator.inertia", 3, 13.0),
+        ("simulator.delay_steps", 4, 8.0),
+        ("simulator.rate", 5, 0.4),
+    ] {
+        for seed in 1..=2 {
+            let (named, passes, left) = found(&[(place, value)], seed);
+            assert_eq!(named.len(), 1, "{name} {seed}: {named:?}");
+            assert_eq!(named[0].0, name);
+            assert!((named[0].1 - value).abs() < 0.03 * value && left.is_finite(), "{named:?} {left}");
+            assert!(passes < 300, "{passes}");
+        }
+    }
+}
+
+#[test]
+fn no_change_is_none() {
+    for seed in 1..=6 {
+        let (named, _, _) = found(&[], seed);
+        assert!(named.is_empty(), "{named:?}");
+    }
+}
+
+#[test]
+fn two_changes_are_both_found() {
+    let (named, passes, _) = found(&[(0, 48.0), (4, 6.0)], 3);
+    let names: Vec<&str> = named.iter().map(|n| n.0.as_str()).collect();
+    assert!(names.contains(&"simulator.c_front") && names.contains(&"simulator.delay_steps"), "{names:?}");
+    assert!(passes < 300, "{passes}");
+}

@@ -1,0 +1,191 @@
+#!/usr/bin/env python3
+"""Makes pairs of car and simulator, diagnoses them, and writes what was said beside what was true.
+
+    diagnose_simulators.py GRIPSIGHT OUT [--table NAME] [--checkout PATH] [--seeds N] [--duration S]
+    diagnose_simulators.py GRIPSIGHT OUT --draw N --seed S [--checkout PATH] [--duration S]
+
+The tables are below; --draw makes N pairs whose simulator, changes, track and noise are drawn, half of them unchanged. Labels are sealed: OUT/sealed.json
+is written first, with its SHA-256 in OUT/commitment.txt; the diagnosis sees each pair's bag and simulator alone. A pair that is done is
+not done again: the run can be stopped and resumed. Packages: see make_simulator_pairs.py.
+"""
+
+import argparse
+import csv
+import hashlib
+import json
+import math
+import secrets
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+MAKER = Path(__file__).resolve().parent / "make_simulator_pairs.py"
+
+# What a drive without longitudinal forces cannot tell apart, by each simulator's own equations.
+GROUPS = {
+    "f1tenth_gym": [{"m", "I"}, {"steer_buffer_size", "delay_s"}],
+    "slipx": [{"mass", "izz"}],
+}
+AROUND = {"delay_s": "steering_delay", "gain": "steering_gain", "offset_rad": "steering_offset", "lever_arm_m": "v_y_lever_arm",
+          "gyro_scale": "gyro_scale"}
+TABLES = {
+    "f1tenth_gym": [
+        ("f1tenth_gym", {"steer_buffer_size": 8}), ("f1tenth_gym", {"C_Sf": 3.7744}), ("f1tenth_gym", {"m": 3.47}),
+        ("f1tenth_gym", {"sv_max": 1.5}),
+    ],
+    "f1tenth_gym_more": [
+        ("f1tenth_gym", {}), ("f1tenth_gym", {"steer_buffer_size": 8, "C_Sf": 3.7744}), ("f1tenth_gym", {"C_Sf": 3.7744, "sv_max": 1.5}),
+        ("f1tenth_gym", {"gain": -0.5}), ("f1tenth_gym", {"gain": -0.5, "C_Sf": 3.7744}),
+    ],
+    "others": [
+        ("slipx", {"tyre_front.mu_y0": 0.9}), ("slipx", {"izz": 0.065}), ("slipx", {"lever_arm_m": -0.16}), ("slipx", {}),
+        ("commonroad_st", {"tire.p_ky1": -17.0}), ("commonroad_st", {"I_z": 2200.0}), ("commonroad_st", {"delay_s": 0.05}),
+        ("commonroad_std", {"tire.p_dy1": 0.85}), ("simple_planning", {"steer_time_delay": 0.15}),
+        ("simple_planning", {"steer_time_constant": 0.4}), ("simple_planning", {}),
+    ],
+}
+# Changes that are drawn: least and largest share of the value, or sizes.
+DRAWN = {
+    "f1tenth_gym": {"C_Sf": (0.7, 0.9), "C_Sr": (0.75, 0.92), "I": (1.1, 1.4), "sv_max": (0.35, 0.6), "steer_buffer_size": (2.0, 4.5)},
+    "slipx": {"izz": (1.15, 1.5), "tyre_front.mu_y0": (0.7, 0.9), "tyre_rear.mu_y0": (1.08, 1.3), "lf": (0.85, 0.95), "c_alpha_f": (0.7, 0.9)},
+    "commonroad_st": {"tire.p_ky1": (0.7, 0.9), "I_z": (1.15, 1.5), "a": (0.88, 0.96)},
+    "commonroad_std": {"tire.p_dy1": (0.7, 0.9), "I_z": (1.15, 1.5), "tire.p_ky1": (0.7, 0.9)},
+    "simple_planning": {"steer_time_delay": (0.4, 0.8), "steer_time_constant": (1.3, 1.8), "steer_rate_lim": (0.04, 0.08)},
+}
+DRAWN_AROUND = {"delay_s": (0.02, 0.08), "gain": (0.05, 0.15), "lever_arm_m": (0.03, 0.1), "gyro_scale": (0.03, 0.08), "offset_rad": (0.005, 0.02)}
+
+
+def drawn(count, seed):
+    rng = np.random.default_rng(seed)
+    rows = []
+    for i in range(count):
+        kind = str(rng.choice(list(DRAWN)))
+        changes = {}
+        if i % 2 == 0:
+            names = list(DRAWN[kind]) + [n for n in DRAWN_AROUND if kind != "simple_planning" or n in ("gyro_scale",)]
+            for name in rng.choice(names, size=1 if rng.random() < 0.7 else 2, replace=False):
+                changes[str(name)] = float(rng.uniform(*{**DRAWN[kind], **DRAWN_AROUND}[str(name)]))
+        # Shares become values where the pair is made.
+        rows.append((kind, changes, int(rng.integers(2**31))))
+    order = rng.permutation(count)
+    return [rows[i] for i in order]
+
+
+def truth_name(name):
+    return AROUND.get(name, f"simulator.{name}")
+
+
+def alike(kind, a, b):
+    bare = lambda n: n.removeprefix("simulator.")
+    a, b = bare(a), bare(b)
+    group = [set(map(lambda n: AROUND.get(n, n), g)) for g in GROUPS.get(kind, [])]
+    return a == b or any(a in g and b in g for g in group)
+
+
+def resolve(kind, changes, checkout):
+    """Shares of a value to values."""
+    sys.path[:0] = [str(MAKER.parent)]
+    import make_simulator_pairs as maker
+
+    values = {p["name"]: p for p in maker.build(kind, checkout)[0].parameters}
+    out = {}
+    for name, share in changes.items():
+        if name in values:
+            value = values[name]["value"] * share
+            out[name] = round(value) if values[name].get("integer") else value
+        else:
+            out[name] = share
+    return out
+
+
+def run(gripsight, folder, kind, changes, seed, arguments):
+    """Makes and diagnoses one pair; the result as a row."""
+    row = folder / "row.json"
+    if row.exists():
+        return json.loads(row.read_text())
+    make = [sys.executable, str(MAKER), str(folder), kind, *(f"{k}={v}" for k, v in changes.items()), "--seed", str(seed),
+            "--duration", str(arguments.duration), "--checkout", str(Path(arguments.checkout).resolve())]
+    if arguments.smooth:
+        make.append("--smooth")
+    subprocess.run(make, check=True)
+    file = folder / "simulator.yaml"
+    file.write_text(file.read_text() + f"python: '{sys.executable}'\ntime_limit_s: 600\n")
+    truth = (folder / "truth.json").rename(folder.parent / f"{folder.name}.truth.json")
+    start = time.time()
+    said = subprocess.run([gripsight, "diagnose", str(folder / "car.mcap"), "--simulator", str(file), "--out", str(folder / "result")],
+                          capture_output=True, text=True)
+    wall_s = time.time() - start
+    truth.rename(folder / "truth.json")
+    if said.returncode not in (0, 3):
+        print(said.stderr, file=sys.stderr)
+        return dict(simulator=kind, truth="; ".join(changes), seed=seed, verdict="error")
+    gap = json.loads((folder / "result/gap.json").read_text())
+    named = [e for e in gap["effects"] if e["accepted"]]
+    right, inside, errors = [], [], []
+    for name, value in changes.items():
+        found = [e for e in named if alike(kind, e["name"], truth_name(name))
+                 or any(alike(kind, c, truth_name(name)) for c in e["confused_with"])]
+        right.append(bool(found))
+        exact = [e for e in named if e["name"] == truth_name(name)]
+        if exact:
+            (p,) = exact[0]["parameters"].values()
+            inside.append(p["low"] <= value <= p["high"])
+            errors.append((p["value"] - value) / abs(value))
+    out = dict(
+        simulator=kind, truth="; ".join(f"{k}={v:.4g}" for k, v in changes.items()) or "unchanged", seed=seed, verdict=gap["verdict"],
+        named="; ".join(f"{e['name']}={next(iter(e['parameters'].values()))['value']:.4g}" for e in named),
+        not_told_from="; ".join(n for e in named for n in e["confused_with"]),
+        all_right=all(right) if changes else not named, extra=max(0, len(named) - len(changes)), inside=f"{sum(inside)}/{len(inside)}",
+        size_error=max((abs(e) for e in errors), default=math.nan), nominal=gap["gap"]["nominal"]["value"], after=gap["gap"]["after"]["value"],
+        patched=gap["patch"]["verified"], rollouts=gap["simulator"]["rollouts"], candidates=gap["simulator"]["candidates"], wall_s=wall_s)
+    row.write_text(json.dumps(out))
+    return out
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("gripsight")
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--table", choices=TABLES)
+    parser.add_argument("--draw", type=int)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--duration", type=float, default=40.0)
+    parser.add_argument("--checkout", default="f1tenth_gym")
+    parser.add_argument("--smooth", action="store_true")
+    arguments = parser.parse_args()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    if arguments.draw is not None:
+        sealed = arguments.out / "sealed.json"
+        if not sealed.exists():
+            rows = [(k, resolve(k, c, arguments.checkout), s) for k, c, s in drawn(arguments.draw, arguments.seed)]
+            text = json.dumps(dict(nonce=secrets.token_hex(16), pairs=rows))
+            (arguments.out / "commitment.txt").write_text(hashlib.sha256(text.encode()).hexdigest() + "\n")
+            sealed.write_text(text)
+        text = sealed.read_text()
+        assert hashlib.sha256(text.encode()).hexdigest() == (arguments.out / "commitment.txt").read_text().strip(), "the seal is broken"
+        cases = [tuple(r) for r in json.loads(text)["pairs"]]
+    else:
+        cases = [(k, c, s) for k, c in TABLES[arguments.table] for s in range(1, arguments.seeds + 1)]
+    rows = []
+    for i, (kind, changes, seed) in enumerate(cases):
+        row = run(arguments.gripsight, arguments.out / f"pair_{i:03}", kind, changes, seed, arguments)
+        rows.append(row)
+        print(*(f"{v:.3g}" if isinstance(v, float) else v for v in row.values()), sep=" | ", flush=True)
+    keys = list(max(rows, key=len))
+    with open(arguments.out / "pairs.csv", "w", newline="") as file:
+        writer = csv.DictWriter(file, keys)
+        writer.writeheader()
+        writer.writerows(rows)
+    done = [r for r in rows if r["verdict"] != "error"]
+    changed = [r for r in done if r["truth"] != "unchanged"]
+    same = [r for r in done if r["truth"] == "unchanged"]
+    print(f"changed: all right {sum(r['all_right'] for r in changed)} of {len(changed)}, extra names in {sum(r['extra'] > 0 for r in changed)}")
+    print(f"unchanged: named something {sum(not r['all_right'] for r in same)} of {len(same)}")
+
+
+if __name__ == "__main__":
+    main()
