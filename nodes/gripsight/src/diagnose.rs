@@ -8,11 +8,13 @@ use anyhow::{Context, bail};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use gripsight_bag::{ReadReport, Role, TopicMap, read_sequences};
-use gripsight_diagnosis::{Diagnosis, Earlier, ExtendedModelFile, Request, Verdict, diagnose};
+use gripsight_diagnosis::{
+    Diagnosis, Earlier, ExtendedModelFile, Graded, Request, Verdict, diagnose, graded,
+};
 use gripsight_identification::export::{read_tires, stamp_text};
 use gripsight_identification::vehicle_hash;
 use gripsight_model::EffectId;
-use gripsight_report::{GapInput, Header, TopicUse, gap_page, gap_text, topic_uses};
+use gripsight_report::{GapInput, Header, TopicUse, gap_page, gap_text, graded_text, topic_uses};
 use gripsight_signals::{StateSequence, WindowConfig};
 use gripsight_vehicle::VehicleParameters;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -65,6 +67,10 @@ pub(crate) struct DiagnoseArgs {
     /// Where the files go; made if it is not there.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
+    /// State beside the verdict how likely something is the matter at each site, with every mechanism and its size; of two drives what has
+    /// changed, whatever either leaves unexplained. The probabilities are not calibrated yet. Takes some seconds more.
+    #[arg(long)]
+    graded: bool,
     /// Write the bag that is explained once more, with the predictions beside its topics: /gripsight/nominal/odom of the model as it came,
     /// /gripsight/extended/odom of the model with the effects found (open-loop rollouts of half a second, each from the recorded pose on).
     #[arg(long, value_name = "BAG")]
@@ -93,6 +99,9 @@ struct GapFile<'a> {
     topics: Vec<TopicUse<'a>>,
     /// What reading the data met, in sentences.
     data_notes: &'a [String],
+    /// The graded answer, where it was asked for.
+    #[serde(flatten)]
+    graded: Option<&'a Graded>,
 }
 
 #[derive(Serialize)]
@@ -144,6 +153,15 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         Request { held_out: held_out.as_ref().map(|h| &h.0), earlier: earlier.as_ref(), ..alone(&sequence) };
     let result = diagnose(&request, &mut progress)
         .with_context(|| format!("cannot diagnose {}", subject.display()))?;
+    let graded = if args.graded && result.verdict != Verdict::NotIdentifiable {
+        let request = alone(&sequence);
+        Some(
+            graded(&request, first.as_ref().map(|first| &first.0), &mut progress)
+                .context("no graded answer")?,
+        )
+    } else {
+        None
+    };
     spinner.finish_and_clear();
     let diagnosing_s = start.elapsed().as_secs_f64() - reading_s;
     let header = header(subject, &vehicle, &sequence);
@@ -161,7 +179,12 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         topics: &report.topics,
         data_notes: &notes,
     })?;
-    let gap_file = GapFile { diagnosis: &result, topics: topic_uses(&report.topics), data_notes: &notes };
+    let gap_file = GapFile {
+        diagnosis: &result,
+        topics: topic_uses(&report.topics),
+        data_notes: &notes,
+        graded: graded.as_ref(),
+    };
     let timing = Timing { reading_s, diagnosing_s, total_s: start.elapsed().as_secs_f64() };
     let texts = [
         serde_json::to_string_pretty(&gap_file)? + "\n",
@@ -180,6 +203,9 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         println!("compared   {} with {before}", file_name(subject));
     }
     print!("{}", gap_text(&result, compared_with.as_deref(), &notes));
+    if let Some(graded) = &graded {
+        print!("{}", graded_text(graded));
+    }
     let names: Vec<&str> = files.iter().map(|f| f.0).collect();
     println!("files      {} ({})", args.out.display(), names.join(", "));
     if let Some(path) = &args.predictions {

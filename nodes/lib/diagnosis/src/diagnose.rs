@@ -73,7 +73,7 @@ const GENERIC: [[f64; 8]; 3] = [
     [14.0, 1.5, 1.7, 0.0, 18.0, 1.5, 1.7, 0.0],
 ];
 /// Windows that the search works on, at most.
-const SEARCH_WINDOWS: usize = 70;
+pub(crate) const SEARCH_WINDOWS: usize = 70;
 
 /// Diagnoses a recording. `progress` is told what is being done, in a few words.
 ///
@@ -238,7 +238,7 @@ fn held_command(hold_s: f64) -> Option<String> {
 }
 
 /// The best tires of a recording, with nothing known of them: from several starts, soft and stiff.
-fn fit_tires(
+pub(crate) fn fit_tires(
     recording: &Recording,
     vehicle: &VehicleParameters,
     windows: &Windows,
@@ -262,7 +262,7 @@ fn fit_tires(
 }
 
 /// The effects to consider, and those that these signals cannot show.
-fn library(
+pub(crate) fn library(
     request: &Request<'_>,
     recording: &Recording,
     trusted: bool,

@@ -85,7 +85,7 @@ impl<'a> Engine<'a> {
     }
 
     /// Tires and hold of the nominal model.
-    fn nominal_base(&self) -> Vec<f64> {
+    pub(crate) fn nominal_base(&self) -> Vec<f64> {
         let mut p = tires_to_parameters(&self.nominal).to_vec();
         p.push(0.5 * self.recording.dt_s());
         p
@@ -226,6 +226,14 @@ impl<'a> Engine<'a> {
             finite: end.stop != StopReason::NotFinite,
             fit,
         }
+    }
+
+    /// Start states of a state's model on other windows.
+    pub(crate) fn starts_of(&self, state: &State, windows: &Windows) -> Vec<[f64; 2]> {
+        if state.starts.len() == windows.windows.len() {
+            return state.starts.clone();
+        }
+        self.score(&state.effects, None, &state.parameters, windows).starts
     }
 
     /// The cost of a state, per residual, as this engine counts it.

@@ -27,15 +27,22 @@
 //! of the reference car.
 
 mod budget;
+mod changes;
 mod confidence;
 mod correct;
+mod decisions;
 mod diagnose;
 mod earlier;
 mod engine;
 mod error;
 mod extended_file;
+mod finding;
+mod graded;
+mod infer;
+mod joint;
 mod noise;
 mod outcome;
+mod patch;
 mod pictures;
 mod place;
 mod plausible;
@@ -48,6 +55,8 @@ mod search;
 mod select;
 mod sizes;
 mod state;
+#[cfg(test)]
+mod testing;
 mod transfer;
 mod trust;
 mod usable;
@@ -58,6 +67,7 @@ pub use diagnose::{Request, diagnose};
 pub use earlier::Earlier;
 pub use error::GapError;
 pub use extended_file::ExtendedModelFile;
+pub use graded::{Change, Graded, MechanismAnswer, SiteAnswer, SizedEffect, graded};
 pub use outcome::{
     Comparison, DetectionLimit, Diagnosis, EffectParameter, GapBudget, GapStep, Invisible, Look, Place,
     Prediction, RankedEffect, Series, TirePair, Unexplained, Verdict, Where,

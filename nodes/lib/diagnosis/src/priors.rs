@@ -8,7 +8,7 @@ use crate::state::State;
 use crate::trust::TireTrust;
 
 /// Bounds of (B C D, C, D, E).
-const TIRE_BOUNDS: [[f64; 2]; 4] = [[1.5, 80.0], [1.0, 2.3], [0.1, 3.0], [-4.0, 0.98]];
+pub(crate) const TIRE_BOUNDS: [[f64; 2]; 4] = [[1.5, 80.0], [1.0, 2.3], [0.1, 3.0], [-4.0, 0.98]];
 /// Effects are expected within this many of their sizes.
 const PRIOR_SIZES: f64 = 3.0;
 /// Trust in the tires is one observation beside thousands of residuals, but the errors of a model within a window are all alike: so many

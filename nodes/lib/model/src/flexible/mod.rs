@@ -27,7 +27,7 @@ use crate::site::Site;
 use crate::terms::{Moment, Outputs, delayed};
 use blocks::{Block, DRIVE_LAGS_S, HARMONICS, SENSED, SENSOR_LAGS_S, STEERING_LAGS_S};
 pub use rooms::Room;
-use series::{before, harmonics, rms, slope, weighted};
+use series::{before, harmonics, increments, rms, slope, weighted};
 
 /// The terms of one site.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -118,10 +118,31 @@ impl Flexible {
         self.blocks.iter().map(|b| b.terms()).sum()
     }
 
+    /// The same scales for the terms of some of the sites.
+    #[must_use]
+    pub fn with_sites(&self, sites: &[Site]) -> Self {
+        let blocks = sites.iter().flat_map(|site| blocks::of_site(*site)).copied().collect();
+        Self { blocks, groups: sites.iter().copied().map(Group::of).collect(), ..self.clone() }
+    }
+
     /// The sites with their parameters, in the parameters' order; none of those opened by room.
     #[must_use]
     pub fn groups(&self) -> &[Group] {
         &self.groups
+    }
+
+    fn is_by_site(&self) -> bool {
+        !self.groups.is_empty()
+    }
+
+    /// A series at each lag before a sample; by site what each further lag adds, so that a prior of one width suits all.
+    fn past(&self, terms: &mut [f64], series: &[f64], k: usize, lags_s: &[f64], dt_s: f64, size: f64) {
+        if self.is_by_site() {
+            return increments(terms, series, k, lags_s, dt_s, size);
+        }
+        for (term, &lag_s) in terms.iter_mut().zip(lags_s) {
+            *term = before(series, k, lag_s, dt_s) / size;
+        }
     }
 
     /// A block's own parameters, where it is open.
@@ -139,9 +160,7 @@ impl Flexible {
             let k = (from + i).min(run.len() - 1);
             let u = run.steering_rad[k] / size;
             let mut terms = [0.0; Block::Steering.terms()];
-            for (term, lag_s) in terms.iter_mut().zip(STEERING_LAGS_S) {
-                *term = before(&run.steering_rad, k, lag_s, run.dt_s) / size;
-            }
+            self.past(&mut terms, &run.steering_rad, k, &STEERING_LAGS_S, run.dt_s, size);
             let rate = slope(&run.steering_rad, k, run.dt_s) / self.steering_rate_radps;
             let rest =
                 [0.3, 0.1 * u * u.abs(), 0.1 * u.powi(3), 0.3 * (3.0 * rate).tanh(), 0.1 * rate * rate.abs()];
@@ -226,9 +245,7 @@ impl Flexible {
         let v = run.v_x_mps[k] / self.speed_mps;
         if let Some(own) = self.of(p, Block::Drive) {
             let mut terms = [0.0; Block::Drive.terms()];
-            for (term, lag_s) in terms.iter_mut().zip(DRIVE_LAGS_S) {
-                *term = before(&run.force_x_mps2, k, lag_s, run.dt_s) / self.a_x_mps2;
-            }
+            self.past(&mut terms, &run.force_x_mps2, k, &DRIVE_LAGS_S, run.dt_s, self.a_x_mps2);
             let f = terms[0];
             let a_y = run.v_x_mps[k] * run.smooth[1][k] / self.a_y_mps2;
             terms[DRIVE_LAGS_S.len()..].copy_from_slice(&[1.0, v, v * v, f * f.abs(), a_y * a_y]);
@@ -266,8 +283,10 @@ impl Flexible {
             let late = SENSOR_LAGS_S.map(|lag_s| delayed(series, T::from(lag_s), out.dt_s));
             for (k, value) in series.iter_mut().enumerate() {
                 let mut more = *value * own[0];
+                let mut newer = *value;
                 for (late, c) in late.iter().zip(&own[1..]) {
-                    more += late[k] * *c;
+                    more += if self.is_by_site() { late[k] - newer } else { late[k] } * *c;
+                    newer = late[k];
                 }
                 let rest = &own[1 + SENSOR_LAGS_S.len()..];
                 let twist = out.yaw_acceleration_radps2[k] / self.yaw_acceleration;

@@ -22,6 +22,17 @@ pub(super) fn before(series: &[f64], k: usize, lag_s: f64, dt_s: f64) -> f64 {
     series[left] + (series[right] - series[left]) * (place - left as f64)
 }
 
+/// The value `lags_s[0]` before sample `k`, then what each further lag adds to it: a series that is late or smoothed is a sum of such increments,
+/// each of the size of what is moved.
+pub(super) fn increments(terms: &mut [f64], series: &[f64], k: usize, lags_s: &[f64], dt_s: f64, size: f64) {
+    let mut newer = 0.0;
+    for (term, &lag_s) in terms.iter_mut().zip(lags_s) {
+        let older = before(series, k, lag_s, dt_s) / size;
+        *term = older - newer;
+        newer = older;
+    }
+}
+
 /// The sum of terms by their parameters.
 pub(super) fn weighted<T: Real>(terms: &[f64], p: &[T]) -> T {
     terms.iter().zip(p).fold(T::from(0.0), |s, (t, c)| s + *c * *t)

@@ -1,6 +1,7 @@
 //! The page of a diagnosis: where model and real car disagree, why, and by how much.
 
 mod budget;
+mod graded;
 mod pictures;
 mod tables;
 mod terminal;
@@ -11,6 +12,7 @@ use gripsight_diagnosis::{Diagnosis, Verdict};
 use gripsight_signals::TopicHealth;
 use maud::{Markup, html};
 
+pub use graded::graded_text;
 pub use terminal::gap_text;
 
 use crate::page::{facts_table, figure, list, page, section};

@@ -1,0 +1,193 @@
+//! What has changed between two drives of one car: every parameter is there in both drives, and its *difference* is what is asked for.
+//!
+//! Both drives are linearised, each around its own best model. The parameters of the earlier drive theta and the differences delta are unknown
+//! together; whatever either drive leaves unexplained is in the parameters and flexible terms of both, and only what one has and the other
+//! has not is a change:
+//!
+//! ```text
+//! cost(theta, delta) = cost_earlier(theta) / phi_earlier + cost_later(theta + delta) / phi_later
+//! ```
+
+use gripsight_estimation::selection::{ColumnPrior, Quadratic, Selection, Term, select};
+use gripsight_model::{BASE, EffectId, Site, TIRES, tires_to_parameters};
+use nalgebra::{DMatrix, DVector};
+
+use crate::decisions;
+use crate::engine::Engine;
+use crate::graded::Change;
+use crate::infer::Inferred;
+use crate::outcome::EffectParameter;
+use crate::trust::TireTrust;
+
+/// Share of a size that matters by which an effect may differ between two drives of a car that nobody has touched.
+const SAME: f64 = 0.03;
+/// Share of what is usual by which a flexible term may.
+const SAME_FLEXIBLE: f64 = 0.5;
+/// Standard deviation of a change of the tires, over that of tires that are the same.
+const OTHER_TIRES: f64 = 10.0;
+/// Half width of a 90 % interval in standard deviations.
+const NINETY: f64 = 1.645;
+
+/// The differences of two drives.
+#[derive(Debug, Clone)]
+pub(crate) struct Compared {
+    selection: Selection,
+    columns: usize,
+    terms: usize,
+}
+
+/// Compares. `later`: the later drive, linearised in the same columns.
+pub(crate) fn compare(engine: &Engine<'_>, earlier: &Inferred, later: &Inferred) -> Option<Compared> {
+    let n = earlier.columns.len();
+    let scaled = |of: &Inferred| Quadratic {
+        information: &of.weighed.total.information / of.dispersion,
+        gradient: &of.weighed.total.gradient / of.dispersion,
+    };
+    let (a, b) = (scaled(earlier), scaled(later));
+    // The later drive was linearised elsewhere: its gradient where the earlier one was.
+    let apart = DVector::from_fn(n, |i, _| earlier.values[i] - later.values[i]);
+    let b_gradient = &b.gradient + &b.information * apart;
+    let mut problem =
+        Quadratic { information: DMatrix::zeros(2 * n, 2 * n), gradient: DVector::zeros(2 * n) };
+    problem.information.view_mut((0, 0), (n, n)).copy_from(&(&a.information + &b.information));
+    for (row, column) in [(0, n), (n, 0), (n, n)] {
+        problem.information.view_mut((row, column), (n, n)).copy_from(&b.information);
+    }
+    problem.gradient.rows_mut(0, n).copy_from(&(&a.gradient + &b_gradient));
+    problem.gradient.rows_mut(n, n).copy_from(&b_gradient);
+    let mut terms = earlier.terms.clone();
+    terms.extend(differences(engine, earlier));
+    let mut start = earlier.selection.best.clone();
+    start.resize(terms.len(), 0);
+    let selection = select(&problem, 1.0, &terms, &start, 23)?;
+    Some(Compared { selection, columns: n, terms: earlier.terms.len() })
+}
+
+/// The differences as terms: nothing to speak of, or a change.
+fn differences(engine: &Engine<'_>, earlier: &Inferred) -> Vec<Term> {
+    let n = earlier.columns.len();
+    let unbounded = [f64::NEG_INFINITY, f64::INFINITY];
+    let weights = || vec![(1.0 - decisions::PRIOR).ln(), decisions::PRIOR.ln()];
+    let same = TireTrust::drive();
+    let mean = tires_to_parameters(&engine.nominal);
+    let tires = (0..TIRES)
+        .map(|j| {
+            let sigma = match j % 4 {
+                0 => same.stiffness * mean[j],
+                1 => same.shape,
+                2 => same.peak * mean[j],
+                _ => same.curvature,
+            };
+            ColumnPrior { offset: 0.0, sigma: vec![sigma, OTHER_TIRES * sigma], bounds: unbounded }
+        })
+        .collect();
+    let hold =
+        (TIRES..BASE).map(|_| ColumnPrior { offset: 0.0, sigma: vec![1e-4], bounds: unbounded }).collect();
+    let mut out = vec![
+        Term { from: n, priors: tires, log_weights: weights() },
+        Term { from: n + TIRES, priors: hold, log_weights: vec![0.0] },
+    ];
+    for &effect in &earlier.columns.effects {
+        let range = earlier.columns.of_effect(effect).unwrap_or(0..0);
+        let open = earlier.is_open(effect);
+        let prior = |(i, spec): (usize, &gripsight_model::ParameterSpec)| {
+            let size = engine.size(spec);
+            let (same, wide) = (SAME * size, decisions::WIDE * size);
+            let same = if i < effect.sizing() { same } else { wide };
+            ColumnPrior {
+                offset: 0.0,
+                sigma: if open { vec![same, wide] } else { vec![same] },
+                bounds: unbounded,
+            }
+        };
+        let priors = effect.spec().parameters.iter().enumerate().map(prior).collect();
+        let log_weights = if open { weights() } else { vec![0.0] };
+        out.push(Term { from: n + range.start, priors, log_weights });
+    }
+    for site in Site::ALL {
+        let range = earlier.columns.of_site(site);
+        let prior = |column: usize| ColumnPrior {
+            offset: 0.0,
+            sigma: vec![
+                SAME_FLEXIBLE * decisions::usual_flexible(site, column - range.start),
+                decisions::FLEXIBLE_WIDE,
+            ],
+            bounds: unbounded,
+        };
+        let priors = range.clone().map(prior).collect();
+        out.push(Term { from: n + range.start, priors, log_weights: weights() });
+    }
+    out
+}
+
+impl Compared {
+    fn probability(&self, term: usize) -> f64 {
+        self.selection.probability[self.terms + term].last().copied().unwrap_or(0.0)
+    }
+
+    /// Probability that an effect differs.
+    fn of_effect(&self, earlier: &Inferred, effect: EffectId) -> f64 {
+        earlier.term_of(effect).filter(|_| earlier.is_open(effect)).map_or(0.0, |t| self.probability(t))
+    }
+
+    /// Probability that the tires differ.
+    fn of_tires(&self) -> f64 {
+        self.probability(0)
+    }
+
+    /// Probability that something differs at a site that no effect of the library does.
+    fn of_site(&self, earlier: &Inferred, site: Site) -> f64 {
+        self.probability(earlier.term_of_site(site))
+    }
+
+    /// Parameters of an effect in the earlier drive.
+    fn earlier(&self, earlier: &Inferred, effect: EffectId) -> Option<Vec<f64>> {
+        let range = earlier.columns.of_effect(effect)?;
+        Some(range.map(|c| earlier.values[c] + self.selection.best_step[c]).collect())
+    }
+
+    /// Differences of an effect's parameters, where it differs, and their standard deviations.
+    fn difference(&self, earlier: &Inferred, effect: EffectId) -> Option<(Vec<f64>, Vec<f64>)> {
+        let place = self.terms + earlier.term_of(effect)?;
+        let wide = self.selection.mean[place].len() - 1;
+        Some((self.selection.mean[place][wide].clone(), self.selection.sigma[place][wide].clone()))
+    }
+
+    /// All that is worth a word, the likeliest first.
+    pub(crate) fn changes(&self, earlier: &Inferred) -> Vec<Change> {
+        let nothing =
+            |unit| EffectParameter { value: f64::NAN, low: f64::NAN, high: f64::NAN, unit, before: None };
+        let mut out = vec![Change {
+            site: Site::FrontAxle.name(),
+            name: "tires",
+            difference: nothing("1"),
+            probability: self.of_tires(),
+        }];
+        for &effect in &earlier.columns.effects {
+            let Some((mean, sigma)) = self.difference(earlier, effect) else { continue };
+            let (mean, half) = (mean[0], NINETY * sigma[0]);
+            let before = self.earlier(earlier, effect).and_then(|own| own.first().copied());
+            let spec = effect.spec();
+            out.push(Change {
+                site: spec.sites.first().map_or("", |s| s.name()),
+                name: effect.name(),
+                difference: EffectParameter {
+                    value: mean,
+                    low: mean - half,
+                    high: mean + half,
+                    unit: spec.parameters[0].unit,
+                    before,
+                },
+                probability: self.of_effect(earlier, effect),
+            });
+        }
+        for site in Site::ALL {
+            let probability = self.of_site(earlier, site);
+            out.push(Change { site: site.name(), name: "other", difference: nothing("1"), probability });
+        }
+        out.retain(|c| c.probability >= decisions::LISTED);
+        out.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        debug_assert_eq!(self.selection.best_step.len(), 2 * self.columns);
+        out
+    }
+}

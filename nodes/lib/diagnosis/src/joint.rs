@@ -1,0 +1,357 @@
+//! Everything at once: tires, effects and flexible terms of all sites linearised together around the present model.
+
+use std::ops::Range;
+
+use gripsight_model::{Rollout, Window};
+use gripsight_vehicle::{Dual, Real};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::engine::{Engine, ROBUST_K};
+use gripsight_estimation::Windows;
+use gripsight_estimation::selection::Quadratic;
+use gripsight_model::EffectId;
+use gripsight_model::{BASE, ExtendedModel};
+use gripsight_model::{Flexible, Group, Site};
+
+/// The columns of the joint problem: tires and hold, then the effects, then the flexible terms.
+#[derive(Debug, Clone)]
+pub(crate) struct Columns {
+    pub(crate) effects: Vec<EffectId>,
+    pub(crate) flexible: Flexible,
+    effect_columns: Vec<Range<usize>>,
+    site_columns: Vec<(Site, Range<usize>)>,
+}
+
+impl Columns {
+    pub(crate) fn new(effects: Vec<EffectId>, flexible: Flexible) -> Self {
+        let mut at = BASE;
+        let mut next = |n: usize| {
+            at += n;
+            at - n..at
+        };
+        let effect_columns = effects.iter().map(|e| next(e.spec().parameters.len())).collect();
+        let site_columns = Site::ALL.into_iter().map(|r| (r, next(Group::of(r).parameters))).collect();
+        Self { effects, flexible, effect_columns, site_columns }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.site_columns.last().map_or(BASE, |(_, r)| r.end)
+    }
+
+    pub(crate) fn of_effect(&self, effect: EffectId) -> Option<Range<usize>> {
+        let place = self.effects.iter().position(|e| *e == effect)?;
+        Some(self.effect_columns[place].clone())
+    }
+
+    pub(crate) fn of_site(&self, site: Site) -> Range<usize> {
+        let found = self.site_columns.iter().find(|(r, _)| *r == site);
+        found.map_or(0..0, |(_, range)| range.clone())
+    }
+
+    /// Values with every effect absent and no flexible term.
+    pub(crate) fn blank(&self, engine: &Engine<'_>) -> Vec<f64> {
+        let mut values = engine.nominal_base();
+        values.extend(self.effects.iter().flat_map(|e| engine.absent(*e)));
+        values.resize(self.len(), 0.0);
+        values
+    }
+
+    /// The model that has those of the terms that are asked for, with its own values and their columns.
+    pub(crate) fn model<'a>(
+        &self,
+        engine: &Engine<'a>,
+        values: &[f64],
+        has_effect: impl Fn(EffectId) -> bool,
+        sites: &[Site],
+    ) -> (ExtendedModel<'a>, Vec<f64>, Vec<usize>) {
+        let effects: Vec<EffectId> = self.effects.iter().copied().filter(|e| has_effect(*e)).collect();
+        let mut columns: Vec<usize> = (0..BASE).collect();
+        columns.extend(effects.iter().filter_map(|e| self.of_effect(*e)).flatten());
+        let flexible = (!sites.is_empty()).then(|| self.flexible.with_sites(sites));
+        columns.extend(sites.iter().flat_map(|r| self.of_site(*r)));
+        let own = columns.iter().map(|&c| values[c]).collect();
+        (engine.model(&effects, flexible.as_ref()), own, columns)
+    }
+}
+
+/// One window around the present model.
+#[derive(Debug, Clone)]
+struct Part {
+    /// (measured - predicted) over the engine's sigma, sample after sample, channel after channel.
+    residual: DVector<f64>,
+    /// Derivatives of the prediction over sigma (N x P).
+    jacobian: DMatrix<f64>,
+    /// The same by the start state (N x 2).
+    start: DMatrix<f64>,
+    /// Which channel each row belongs to.
+    channel: Vec<usize>,
+}
+
+/// The joint problem around a model.
+#[derive(Debug, Clone)]
+pub(crate) struct Joint {
+    parts: Vec<Part>,
+    block: Vec<usize>,
+    channels: usize,
+    columns: usize,
+}
+
+/// The joint problem with its noise, block by block.
+#[derive(Debug, Clone)]
+pub(crate) struct Weighed {
+    pub(crate) total: Quadratic,
+    pub(crate) blocks: Vec<Quadratic>,
+    /// Weighted sum of squares, and how many residuals it has.
+    pub(crate) cost: f64,
+    pub(crate) residuals: f64,
+}
+
+/// Columns that are worked on together: the derivatives of a number are of fixed count.
+const LANES: usize = 24;
+
+impl Joint {
+    /// Linearises all columns at `values`, from given start states. Terms that are absent there are run only where their own columns are looked at.
+    pub(crate) fn around(
+        engine: &Engine<'_>,
+        columns: &Columns,
+        values: &[f64],
+        starts: &[[f64; 2]],
+        windows: &Windows,
+    ) -> Option<Self> {
+        let present = |e: EffectId| {
+            let range = columns.of_effect(e).unwrap_or(0..0);
+            range.zip(e.spec().parameters).any(|(c, p)| (values[c] - p.null).abs() > 1e-12)
+        };
+        let open: Vec<Site> =
+            Site::ALL.into_iter().filter(|r| columns.of_site(*r).any(|c| values[c] != 0.0)).collect();
+        let seeds = chunks(columns);
+        let models: Vec<_> = seeds
+            .iter()
+            .map(|seeds| {
+                let here = |e: EffectId| {
+                    columns.of_effect(e).is_some_and(|r| r.start >= seeds.start && r.end <= seeds.end)
+                };
+                let sites: Vec<Site> = Site::ALL
+                    .into_iter()
+                    .filter(|r| open.contains(r) || overlap(&columns.of_site(*r), seeds))
+                    .collect();
+                columns.model(engine, values, |e| present(e) || here(e), &sites)
+            })
+            .collect();
+        let channels = engine.recording.channels.len();
+        let parts: Vec<Part> = windows
+            .windows
+            .par_iter()
+            .zip(starts)
+            .map(|(window, start)| {
+                let mut measured = Vec::new();
+                models[0].0.measured(window, &mut measured);
+                let kept: Vec<usize> = (0..measured.len()).filter(|&i| !measured[i].is_nan()).collect();
+                let n = kept.len();
+                let mut part = Part {
+                    residual: DVector::zeros(n),
+                    jacobian: DMatrix::zeros(n, columns.len()),
+                    start: DMatrix::zeros(n, 2),
+                    channel: kept.iter().map(|i| i % channels).collect(),
+                };
+                let mut predicted = Vec::new();
+                for (number, (seeds, (model, own, map))) in seeds.iter().zip(&models).enumerate() {
+                    seeded(model, own, map, seeds, *start, window, &mut predicted);
+                    for (row, &i) in kept.iter().enumerate() {
+                        let sigma = engine.sigma[i % channels];
+                        let derivatives = predicted[i].derivatives();
+                        for (lane, column) in seeds.clone().enumerate() {
+                            part.jacobian[(row, column)] = derivatives[lane] / sigma;
+                        }
+                        if number == 0 {
+                            part.residual[row] = (measured[i] - predicted[i].re()) / sigma;
+                            for s in 0..2 {
+                                part.start[(row, s)] = derivatives[LANES + s] / sigma;
+                            }
+                        }
+                    }
+                }
+                part
+            })
+            .collect();
+        let finite = parts
+            .iter()
+            .all(|p| p.residual.iter().all(|v| v.is_finite()) && p.jacobian.iter().all(|v| v.is_finite()));
+        finite.then(|| Self { parts, block: windows.block.clone(), channels, columns: columns.len() })
+    }
+
+    /// Puts a column's difference quotient in place of its derivative: for an effect whose derivative vanishes where it is absent. `differences`:
+    /// predictions with the effect less those without, over its value, window after window in the layout of the model.
+    pub(crate) fn with_column(&mut self, engine: &Engine<'_>, column: usize, slopes: &[Vec<f64>]) {
+        for (part, slope) in self.parts.iter_mut().zip(slopes) {
+            for (row, (s, &channel)) in slope.iter().zip(&part.channel).enumerate() {
+                part.jacobian[(row, column)] = s / engine.sigma[channel];
+            }
+        }
+    }
+
+    /// What a column of difference quotients would take off the sum of squares by a step up, everything but the start states as it is.
+    pub(crate) fn promise(&self, engine: &Engine<'_>, slopes: &[Vec<f64>]) -> f64 {
+        let one = vec![1.0; self.channels];
+        let (mut product, mut square) = (0.0, 0.0);
+        for (part, slope) in self.parts.iter().zip(slopes) {
+            let column =
+                DMatrix::from_fn(part.channel.len(), 1, |r, _| slope[r] / engine.sigma[part.channel[r]]);
+            let alone = Part { jacobian: column, ..part.without_columns() };
+            let (residual, jacobian, _) = alone.projected(&one);
+            product += jacobian.column(0).dot(&residual);
+            square += jacobian.norm_squared();
+        }
+        if product > 0.0 && square > 0.0 { product * product / square } else { 0.0 }
+    }
+
+    /// The problem where channel `c` has `scale[c]` times the noise that it was linearised with.
+    pub(crate) fn weighed(&self, scale: &[f64]) -> Weighed {
+        let blocks: Vec<Vec<usize>> = {
+            let mut out: Vec<(usize, Vec<usize>)> = Vec::new();
+            for (k, &b) in self.block.iter().enumerate() {
+                match out.last_mut().filter(|l| l.0 == b) {
+                    Some(last) => last.1.push(k),
+                    None => out.push((b, vec![k])),
+                }
+            }
+            out.into_iter().map(|b| b.1).collect()
+        };
+        let parts: Vec<(Quadratic, f64, f64)> = blocks
+            .par_iter()
+            .map(|members| {
+                let reduced: Vec<_> = members.iter().map(|&k| self.parts[k].reduced(scale)).collect();
+                let rows: usize = reduced.iter().map(|r| r.0.len()).sum();
+                let mut tall = DMatrix::zeros(rows, self.columns);
+                let mut side = DVector::zeros(rows);
+                let (mut at, mut cost) = (0, 0.0);
+                for (residual, jacobian, loss) in &reduced {
+                    tall.rows_mut(at, residual.len()).copy_from(jacobian);
+                    side.rows_mut(at, residual.len()).copy_from(residual);
+                    at += residual.len();
+                    cost += loss;
+                }
+                let information = tall.tr_mul(&tall);
+                (Quadratic { information, gradient: -tall.tr_mul(&side) }, cost, rows as f64)
+            })
+            .collect();
+        let n = self.columns;
+        let zero = Quadratic { information: DMatrix::zeros(n, n), gradient: DVector::zeros(n) };
+        let mut out = Weighed { total: zero, blocks: Vec::new(), cost: 0.0, residuals: 0.0 };
+        for (block, cost, rows) in parts {
+            out.total.information += &block.information;
+            out.total.gradient += &block.gradient;
+            out.blocks.push(block);
+            out.cost += cost;
+            out.residuals += rows;
+        }
+        out
+    }
+
+    /// Mean square of what a step leaves of each channel, in units of the engine's sigma: median over windows.
+    pub(crate) fn left_by_channel(&self, step: &DVector<f64>) -> Vec<f64> {
+        let mut squares = vec![Vec::with_capacity(self.parts.len()); self.channels];
+        let one = vec![1.0; self.channels];
+        for part in &self.parts {
+            let (residual, jacobian, _) = part.projected(&one);
+            let left = residual - jacobian * step;
+            let mut sums = vec![(0.0, 0.0); self.channels];
+            for (v, &c) in left.iter().zip(&part.channel) {
+                sums[c].0 += v * v;
+                sums[c].1 += 1.0;
+            }
+            for (c, (s, n)) in sums.into_iter().enumerate().filter(|(_, s)| s.1 > 0.0) {
+                squares[c].push(s / n);
+            }
+        }
+        squares.into_iter().map(|s| if s.is_empty() { 1.0 } else { gripsight_model::median(s) }).collect()
+    }
+}
+
+impl Part {
+    fn without_columns(&self) -> Self {
+        Self {
+            residual: self.residual.clone(),
+            jacobian: DMatrix::zeros(0, 0),
+            start: self.start.clone(),
+            channel: self.channel.clone(),
+        }
+    }
+
+    /// Residuals and derivatives with the start state taken out.
+    fn projected(&self, scale: &[f64]) -> (DVector<f64>, DMatrix<f64>, DMatrix<f64>) {
+        let weights: Vec<f64> = self.channel.iter().map(|&c| 1.0 / scale[c]).collect();
+        let by = |m: &DMatrix<f64>| DMatrix::from_fn(m.nrows(), m.ncols(), |r, c| m[(r, c)] * weights[r]);
+        let residual = DVector::from_fn(self.residual.len(), |r, _| self.residual[r] * weights[r]);
+        let (jacobian, start) = (by(&self.jacobian), by(&self.start));
+        let square = start.tr_mul(&start) + DMatrix::identity(2, 2) * 1e-12;
+        let Some(inverse) = square.try_inverse() else { return (residual, jacobian, start) };
+        let shares = inverse * start.transpose();
+        let residual_less = &residual - &start * (&shares * &residual);
+        let jacobian_less = &jacobian - &start * (&shares * &jacobian);
+        (residual_less, jacobian_less, start)
+    }
+
+    /// The same with the window's robust weight, and its cost.
+    fn reduced(&self, scale: &[f64]) -> (DVector<f64>, DMatrix<f64>, f64) {
+        let (residual, jacobian, _) = self.projected(scale);
+        let n = residual.len() as f64;
+        let root = (1.0 + residual.norm_squared() / n / (ROBUST_K * ROBUST_K)).sqrt();
+        let weight = (1.0 / root).sqrt();
+        let cost = n * 2.0 * ROBUST_K * ROBUST_K * (root - 1.0);
+        (residual * weight, jacobian * weight, cost)
+    }
+}
+
+fn overlap(a: &Range<usize>, b: &Range<usize>) -> bool {
+    a.start < b.end && b.start < a.end
+}
+
+/// The columns in parts of at most [`LANES`]: tires first, no effect torn apart.
+fn chunks(columns: &Columns) -> Vec<Range<usize>> {
+    let mut out = vec![0..BASE];
+    let mut from = BASE;
+    let mut end = BASE;
+    for range in &columns.effect_columns {
+        if range.end - from > LANES && end > from {
+            out.push(from..end);
+            from = end;
+        }
+        end = range.end;
+    }
+    if end > from {
+        out.push(from..end);
+    }
+    for (_, range) in &columns.site_columns {
+        let mut at = range.start;
+        while at < range.end {
+            let to = (at + LANES).min(range.end);
+            out.push(at..to);
+            at = to;
+        }
+    }
+    out
+}
+
+/// A prediction with the derivatives of some columns, and, in the last two lanes, those of the start state.
+fn seeded(
+    model: &ExtendedModel<'_>,
+    own: &[f64],
+    map: &[usize],
+    seeds: &Range<usize>,
+    start: [f64; 2],
+    window: &Window,
+    out: &mut Vec<Dual<{ LANES + 4 }>>,
+) {
+    type Number = Dual<{ LANES + 4 }>;
+    let theta: Vec<Number> = own
+        .iter()
+        .zip(map)
+        .map(|(&v, &column)| {
+            if seeds.contains(&column) { Number::variable(v, column - seeds.start) } else { Number::from(v) }
+        })
+        .collect();
+    let start = [Number::variable(start[0], LANES), Number::variable(start[1], LANES + 1)];
+    model.rollout(&theta, start, window, out);
+}
