@@ -196,6 +196,7 @@ impl IdentifyArgs {
 pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
     let mut timing = Timing::default();
     let start = Instant::now();
+    together::check(args)?;
     let topics = args.topics.as_deref().map(TopicMap::read).transpose()?.unwrap_or_default();
     let vehicle = args.vehicle()?;
     let mut previous = args.previous.as_deref().map(previous::read).transpose()?;

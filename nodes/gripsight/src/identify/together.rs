@@ -9,15 +9,21 @@ use gripsight_vehicle::VehicleParameters;
 use super::IdentifyArgs;
 use crate::invocation::file_name;
 
+/// What several bags cannot be given with.
+pub(super) fn check(args: &IdentifyArgs) -> anyhow::Result<()> {
+    let for_one = args.window.is_some() || args.sequence.is_some() || args.truth.is_some();
+    if args.bags.len() > 1 && for_one {
+        bail!("--window, --sequence and --truth are for one bag");
+    }
+    Ok(())
+}
+
 /// All bags as one sequence, and each by itself; `first` is what the first one holds.
 pub(super) fn read(
     args: &IdentifyArgs,
     topics: &TopicMap,
     first: Vec<StateSequence>,
 ) -> anyhow::Result<(Vec<StateSequence>, Vec<StateSequence>)> {
-    if args.window.is_some() || args.sequence.is_some() || args.truth.is_some() {
-        bail!("--window, --sequence and --truth are for one bag");
-    }
     let whole = WindowConfig { length_s: f64::INFINITY, hop_s: f64::INFINITY };
     let mut alone = first;
     for bag in &args.bags[1..] {
