@@ -125,14 +125,8 @@ impl Fitter<'_> {
             for (channel, (_, sigma)) in drive.channels.iter().enumerate() {
                 let mut column = Vec::new();
                 for w in &drive.windows {
-                    for i in w.from..w.from + w.len {
-                        column.extend(
-                            (0..count).map(
-                                |c| {
-                                    if c == channel { -values[w.stretch][i] / sigma } else { 0.0 }
-                                },
-                            ),
-                        );
+                    for value in &values[w.stretch][w.from..w.from + w.len] {
+                        column.extend((0..count).map(|c| if c == channel { -value / sigma } else { 0.0 }));
                     }
                 }
                 out.push((term.mechanism, column));
