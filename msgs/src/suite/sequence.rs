@@ -23,7 +23,7 @@ macro_rules! message {
             pub chunk: u32,
             /// Parts in all, at least 1.
             pub chunks: u32,
-            $(#[doc = concat!("[", $unit, "] ", $meaning)] pub $name: Vec<f32>,)*
+            $(#[doc = concat!("`", $unit, "`: ", $meaning)] pub $name: Vec<f32>,)*
         }
 
         impl StateSequence {

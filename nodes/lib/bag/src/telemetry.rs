@@ -13,10 +13,10 @@ use crate::{Bag, BagError, Streams, TopicMap, decode, health};
 pub struct ReadReport {
     /// Where each stream was found.
     pub streams: Streams,
-    /// Messages by stream, in the order of [`Role::ALL`].
+    /// Messages by stream, in the order of [`Role::ALL`](crate::Role::ALL).
     #[serde(serialize_with = "crate::topics::by_role")]
     pub counts: [usize; 4],
-    /// State of each stream's messages, in the order of [`Role::ALL`]; empty where recorded sequences were used.
+    /// State of each stream's messages, in the order of [`Role::ALL`](crate::Role::ALL); empty where recorded sequences were used.
     pub topics: Vec<TopicHealth>,
     /// Messages that said nothing about their stream: joints that are not the four wheels, sensors that report "not measured".
     pub without_content: usize,

@@ -310,7 +310,7 @@ fn overlap(a: &Range<usize>, b: &Range<usize>) -> bool {
 
 /// The columns in parts of at most [`LANES`]: tires first, no effect torn apart.
 fn chunks(columns: &Columns) -> Vec<Range<usize>> {
-    let mut out = Vec::from_iter([0..BASE]);
+    let mut out: Vec<Range<usize>> = std::iter::once(0..BASE).collect();
     let mut from = BASE;
     let mut end = BASE;
     for range in &columns.effect_columns {

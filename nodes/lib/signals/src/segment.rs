@@ -21,7 +21,7 @@ macro_rules! segment {
             pub start_time_s: f64,
             /// Step of the grid.
             pub dt_s: f64,
-            $(#[doc = concat!("[", $unit, "] ", $meaning)] pub $name: Vec<f64>,)*
+            $(#[doc = concat!("`", $unit, "`: ", $meaning)] pub $name: Vec<f64>,)*
             /// [m/s] commanded speed in force
             pub command_speed_mps: Vec<f64>,
             /// [m/s^2] commanded acceleration in force

@@ -16,7 +16,7 @@ macro_rules! sequence {
             pub sequence_id: u64,
             /// Stamp of the first sample.
             pub start_stamp_ns: i64,
-            $(#[doc = concat!("[", $unit, "] ", $meaning)] pub $name: Vec<f32>,)*
+            $(#[doc = concat!("`", $unit, "`: ", $meaning)] pub $name: Vec<f32>,)*
         }
 
         impl StateSequence {

@@ -198,7 +198,7 @@ mod tests {
     fn starts_take_what_they_explain_and_no_more() {
         let layout = Layout { windows: vec![(0, 4), (4, 4)], held_out: vec![false; 2], block: vec![0, 0] };
         let column = vec![1.0, 0.5, 0.25, 0.125, 2.0, 1.0, 0.5, 0.25];
-        let starts = Starts::new(&layout, &[column.clone()]);
+        let starts = Starts::new(&layout, std::slice::from_ref(&column));
         let v: Vec<f64> = column.iter().enumerate().map(|(i, c)| if i < 4 { 3.0 * c } else { -c }).collect();
         let (left, shifts) = starts.project(&layout, &v);
         assert!(left.iter().all(|r| r.abs() < 1e-6));

@@ -2,7 +2,10 @@ use super::*;
 use crate::test_car::TestCar;
 use crate::{Channel, Drive, Model, Roll as _, SimulatorFile, candidates};
 
-fn found(changed: &[(usize, f64)], seed: u64) -> (Vec<(String, f64, f64, f64)>, usize, f64) {
+/// Effect, size and interval.
+type Named = (String, f64, f64, f64);
+
+fn found(changed: &[(usize, f64)], seed: u64) -> (Vec<Named>, usize, f64) {
     let car = TestCar::new();
     let (sequence, commands) = car.recorded(changed, 40.0, seed);
     let file = SimulatorFile::parse("command: [none]", std::env::temp_dir().as_path()).unwrap();
