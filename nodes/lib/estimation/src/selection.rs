@@ -442,9 +442,21 @@ mod tests {
 
     #[test]
     fn what_the_data_cannot_tell_apart_shares_its_probability() {
-        let s = select(&problem(25.0), 1.0, &terms(), &[0, 0, 0], 1).unwrap();
+        let (problem, terms) = (problem(8.0), terms());
+        let s = select(&problem, 1.0, &terms, &[0, 0, 0], 1).unwrap();
+        let weight = |chosen: &[usize]| {
+            let prior: f64 = terms.iter().zip(chosen).map(|(t, &a)| t.log_weights[a]).sum();
+            (configuration(&problem, 1.0, &terms, chosen).unwrap().log_evidence + prior).exp()
+        };
+        let all: Vec<[usize; 3]> = (0..8).map(|i| [i & 1, i >> 1 & 1, i >> 2]).collect();
+        let total: f64 = all.iter().map(|c| weight(c)).sum();
+        for term in 0..3 {
+            let exact = all.iter().filter(|c| c[term] == 1).map(|c| weight(c)).sum::<f64>() / total;
+            // A standard deviation of a sampled probability is at most 0.5 / sqrt(150) = 0.04.
+            approx::assert_abs_diff_eq!(s.probability[term][1], exact, epsilon = 0.12);
+        }
         let either = s.probability_that(|c| c[0] == 1 || c[1] == 1);
-        assert!(either > 0.5 && s.probability[0][1] > 0.15 && s.probability[1][1] > 0.15, "{s:?}");
+        assert!(either > 0.9 && s.probability[0][1] > 0.1 && s.probability[1][1] > 0.1, "{either} {:?}", s.probability);
     }
 
     #[test]
