@@ -83,6 +83,8 @@ public:
         interval("front_cornering_stiffness_n_per_rad"), interval("rear_cornering_stiffness_n_per_rad");
         peak("front_peak"), peak("rear_peak");
         doubles("front_slip_rad", {"low", "high"}), doubles("rear_slip_rad", {"low", "high"});
+        field<double>("front_valid_slip_rad"), field<double>("rear_valid_slip_rad");
+        field<double>("front_valid_force_n"), field<double>("rear_valid_force_n");
         doubles("signals", {"steering_delay_s", "steering_gain", "steering_offset_rad", "v_y_lever_arm_m",
                             "v_y_bias_mps", "yaw_rate_bias_radps"});
         field<double>("v_x_mean_mps");
@@ -111,7 +113,9 @@ private:
         T value{};
         cdr_ >> value;
         key(name);
-        out_ << +value;
+        // As Python writes it.
+        if (value != value) out_ << "NaN";
+        else out_ << +value;
     }
     void flag(const char* name) {
         bool value{};

@@ -139,6 +139,13 @@ pub fn start_built(domain: &Domain, program: &Path, topic: &str, count: u32) -> 
 /// # Panics
 /// When none comes in time, or it is not of the type.
 pub fn message<M: DeserializeOwned>(peer: &Process) -> M {
-    let line = peer.line(PATIENCE);
-    serde_json::from_str(&line).unwrap_or_else(|error| panic!("{error}: {line:.500}"))
+    parsed(&peer.line(PATIENCE))
+}
+
+/// A message from a peer's line: JSON with Python's NaN, which only JSON5 has.
+///
+/// # Panics
+/// When the line is not of the type.
+pub fn parsed<M: DeserializeOwned>(line: &str) -> M {
+    json5::from_str(line).unwrap_or_else(|error| panic!("{error}: {line:.500}"))
 }
