@@ -1,0 +1,12 @@
+#!/usr/bin/env bash
+# The loop closed: the reference car on roads that it does not know, from mu = 0.51, driven and identified in turns.
+# Usage: launch_scripts/closed_loop.sh OUT [--quick] [more options; --help lists them]
+# Writes OUT/laps.csv (a row a lap) and OUT/summary.md, which also goes to standard output. --quick: minutes instead of an hour.
+set -euo pipefail
+out=${1:?usage: launch_scripts/closed_loop.sh OUT [--quick]}
+shift
+case $out in -*) ;; /*) ;; *) out=$PWD/$out ;; esac
+cd "$(dirname "$0")/.."
+
+cargo build --locked -p gripsight_driving --example closed_loop
+exec "${CARGO_TARGET_DIR:-target}/debug/examples/closed_loop" "$out" "$@"

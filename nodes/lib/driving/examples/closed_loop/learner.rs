@@ -1,0 +1,132 @@
+//! What the identifier does, in process: telemetry in, tire sets and warnings to the driver.
+
+use std::collections::VecDeque;
+
+use anyhow::Result;
+use gripsight_driving::{Actuator, Driver, TireSet, Trust};
+use gripsight_identification::{
+    AcceptedSet, Config, FrictionPrior, GripWatch, Outcome, ResidualKind, Status, identify,
+};
+use gripsight_reference_car::SensorSample;
+use gripsight_signals::{AlignConfig, Aligner, StateSequence, TelemetrySample};
+use gripsight_vehicle::{GRAVITY_MPS2, PacejkaParameters, VehicleParameters};
+
+/// Longest telemetry to identify from, and shortest.
+const WINDOW_S: (f64, f64) = (30.0, 8.0);
+
+/// What the identifier does, in process.
+pub(crate) struct Learner {
+    vehicle: VehicleParameters,
+    prior: Option<FrictionPrior>,
+    aligner: Aligner,
+    recent: VecDeque<TelemetrySample>,
+    in_use: Option<AcceptedSet>,
+    watch: Option<GripWatch>,
+    config: Config,
+}
+
+impl Learner {
+    pub(crate) fn new(vehicle: VehicleParameters, prior: Option<FrictionPrior>) -> Self {
+        Self {
+            vehicle,
+            prior,
+            aligner: Aligner::new(AlignConfig::default()),
+            recent: VecDeque::new(),
+            in_use: None,
+            watch: None,
+            config: Config { residual: ResidualKind::None, ..Config::default() },
+        }
+    }
+
+    pub(crate) fn push(&mut self, sample: &SensorSample, driver: &mut Driver) -> Result<()> {
+        self.aligner.push(sample.measurement(1_000_000_000))?;
+        while let Some(aligned) = self.aligner.poll() {
+            let look = self.watch.as_mut().and_then(|watch| watch.push(&aligned));
+            if let Some(look) = look.filter(|look| look.fallen) {
+                driver.warn(Some(look.share));
+            }
+            self.recent.push_back(aligned);
+            while self.span_s() > WINDOW_S.0 {
+                self.recent.pop_front();
+            }
+        }
+        Ok(())
+    }
+
+    fn span_s(&self) -> f64 {
+        let ends = self.recent.front().zip(self.recent.back());
+        ends.map_or(0.0, |(a, b)| (b.odometry.stamp_ns - a.odometry.stamp_ns) as f64 * 1e-9)
+    }
+
+    pub(crate) fn identify(&mut self, driver: &mut Driver, verbose: bool) -> Result<()> {
+        if self.span_s() < WINDOW_S.1 {
+            return Ok(());
+        }
+        let samples: Vec<TelemetrySample> = self.recent.iter().cloned().collect();
+        let sequence = StateSequence::from_samples(&samples)?;
+        let outcome =
+            identify(&sequence, &self.vehicle, self.prior, self.in_use.as_ref(), &self.config, &mut |_| {});
+        let outcome = match outcome {
+            Ok(outcome) => outcome,
+            Err(error) => {
+                if verbose {
+                    eprintln!("  no set: {error}");
+                }
+                return Ok(());
+            }
+        };
+        if verbose {
+            eprintln!(
+                "  {}: D {:.3} {:.3} found {:.3} {:.3} reached {} {} delay {:.3} {}",
+                outcome.status.name(),
+                outcome.phi_p.front.d,
+                outcome.phi_p.rear.d,
+                outcome.found.front.d,
+                outcome.found.rear.d,
+                outcome.peak_friction.front.reached,
+                outcome.peak_friction.rear.reached,
+                outcome.signals.steering_delay_s,
+                outcome
+                    .provisional
+                    .map_or(String::new(), |p| format!("prior {:.3} {:.3}", p.phi_p.front.d, p.phi_p.rear.d)),
+            );
+        }
+        if outcome.replaces(self.in_use.as_ref()) {
+            let trust =
+                if outcome.status == Status::Accepted { Trust::Accepted } else { Trust::AcceptedWithin };
+            take(driver, &outcome, &outcome.phi_p, trust, verbose);
+            self.in_use = outcome.accepted_set();
+            self.watch = self.in_use.as_ref().map(|set| GripWatch::new(&self.vehicle, set)).transpose()?;
+        }
+        if let Some(set) = &outcome.provisional {
+            take(driver, &outcome, &set.phi_p, Trust::Provisional, verbose);
+        }
+        Ok(())
+    }
+}
+
+/// Hands a set to the driver, as a message would.
+fn take(driver: &mut Driver, outcome: &Outcome, tires: &PacejkaParameters, trust: Trust, verbose: bool) {
+    let slip = &outcome.valid_within.slip_rad;
+    let signals = &outcome.signals;
+    let set = TireSet {
+        tires: *tires,
+        trust,
+        valid_slip_rad: if trust == Trust::Provisional {
+            [f64::INFINITY; 2]
+        } else {
+            [slip.front, slip.rear]
+        },
+        likely_peak: Some(outcome.peak_friction.front.value.min(outcome.peak_friction.rear.value)),
+        actuator: Actuator {
+            delay_s: signals.steering_delay_s.max(0.0),
+            gain: signals.steering_gain,
+            offset_rad: signals.steering_offset_rad,
+        },
+    };
+    if let Err(error) = driver.take(set)
+        && verbose
+    {
+        eprintln!("  not taken: {error}; {} m/s2", GRAVITY_MPS2 * set.grip());
+    }
+}

@@ -1,0 +1,121 @@
+//! The loop closed: a car on a road that it does not know is driven, identified while it drives, and driven faster.
+//!
+//! `launch_scripts/closed_loop.sh OUT [--quick]` runs it. In process, many times real time; the driver sees the noisy odometry, the identification
+//! the noisy telemetry, and only the referee the truth.
+
+mod learner;
+mod plant;
+mod run;
+mod table;
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use anyhow::Result;
+use clap::Parser;
+use gripsight_reference_car::CarParameters;
+use rayon::prelude::*;
+use run::{Case, Run, Variant, drive};
+
+/// Drives the reference car from mu = 0.51 on roads that it does not know, with and without identification.
+#[derive(Debug, Parser)]
+#[command(
+    name = "closed_loop",
+    after_help = "Examples:\n  closed_loop out --quick\n  closed_loop out --cars f1tenth --tracks club,oval --frictions 0.6,0.9 --seeds 3\n  closed_loop out --quick --verbose"
+)]
+struct Arguments {
+    /// Folder for laps.csv and summary.md
+    out: PathBuf,
+    /// One track, one friction, the 1:10 car, two seeds
+    #[arg(long)]
+    quick: bool,
+    /// Cars
+    #[arg(long, value_delimiter = ',', default_value = "f1tenth,passenger_car")]
+    cars: Vec<String>,
+    /// Tracks
+    #[arg(long, value_delimiter = ',', default_value = "harbor,valley,quarry,delta,lagoon")]
+    tracks: Vec<String>,
+    /// Frictions of the road
+    #[arg(long, value_delimiter = ',', default_value = "0.4,0.65,0.9")]
+    frictions: Vec<f64>,
+    /// Seeds of each, from 1
+    #[arg(long, default_value_t = 2)]
+    seeds: u64,
+    /// First seed
+    #[arg(long, default_value_t = 1)]
+    from_seed: u64,
+    /// Variants; all without
+    #[arg(long, value_delimiter = ',')]
+    variants: Vec<String>,
+    /// Laps of a run
+    #[arg(long, default_value_t = 5)]
+    laps: usize,
+    /// Says on standard error what happens in each run; one after the other
+    #[arg(long)]
+    verbose: bool,
+}
+
+/// A run with what it was.
+#[derive(Debug, Clone)]
+pub(crate) struct Driven {
+    pub(crate) case: Case,
+    pub(crate) variant: Variant,
+    pub(crate) run: Run,
+    pub(crate) seconds: f64,
+}
+
+fn main() -> Result<()> {
+    let mut arguments = Arguments::parse();
+    if arguments.quick {
+        arguments.cars = vec!["f1tenth".to_owned()];
+        arguments.tracks.truncate(1);
+        arguments.frictions = vec![0.9];
+        arguments.seeds = arguments.seeds.min(2);
+    }
+    let mut work = Vec::new();
+    for car in &arguments.cars {
+        let car = CarParameters::by_name(car)?;
+        for &mu in &arguments.frictions {
+            let tires = plant::projection(&car, mu)?;
+            if arguments.verbose {
+                eprintln!("{} on {mu}: {tires:?}", car.name);
+            }
+            for track in &arguments.tracks {
+                for seed in arguments.from_seed..arguments.from_seed + arguments.seeds {
+                    let (car, track, laps) = (car.clone(), track.clone(), arguments.laps);
+                    let case = Case { car, track, mu, seed, laps, tires };
+                    let asked = |v: &Variant| {
+                        arguments.variants.is_empty() || arguments.variants.iter().any(|n| n == v.name())
+                    };
+                    work.extend(
+                        Variant::ALL.into_iter().filter(asked).map(|variant| (case.clone(), variant)),
+                    );
+                }
+            }
+        }
+    }
+    let (count, done) = (work.len(), AtomicUsize::new(0));
+    let one = |(case, variant): (Case, Variant)| -> Result<Driven> {
+        if arguments.verbose {
+            eprintln!("{} {} {} seed {} {}", case.car.name, case.track, case.mu, case.seed, variant.name());
+        }
+        let begin = std::time::Instant::now();
+        let run = drive(&case, variant, arguments.verbose)?;
+        let number = done.fetch_add(1, Ordering::Relaxed) + 1;
+        if number.is_multiple_of(10) || number == count {
+            eprintln!("{number} of {count} runs");
+        }
+        Ok(Driven { case, variant, run, seconds: begin.elapsed().as_secs_f64() })
+    };
+    let driven: Vec<Driven> = if arguments.verbose {
+        work.into_iter().map(one).collect::<Result<_>>()?
+    } else {
+        work.into_par_iter().map(one).collect::<Result<_>>()?
+    };
+    std::fs::create_dir_all(&arguments.out)?;
+    std::fs::write(arguments.out.join("laps.csv"), table::laps_csv(&driven))?;
+    let summary = table::summary(&driven);
+    std::fs::write(arguments.out.join("summary.md"), &summary)?;
+    print!("{summary}");
+    Ok(())
+}

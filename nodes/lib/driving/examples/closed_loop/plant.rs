@@ -1,0 +1,87 @@
+//! The reference car, its track, and its tires projected on Phi_p.
+
+use anyhow::{Context, Result};
+use gripsight_driving::{Drivetrain, Track};
+use gripsight_identification::nelder_mead::{NelderMeadConfig, minimize};
+use gripsight_identification::tires::BOUNDS;
+use gripsight_reference_car as reference;
+use gripsight_reference_car::{CarParameters, Course, Friction, Scenario, Simulation};
+use gripsight_vehicle::{MagicFormula, PacejkaParameters, VehicleParameters};
+
+/// What a data sheet says of a built-in car.
+pub(crate) fn vehicle(car: &CarParameters) -> Result<VehicleParameters> {
+    Ok(VehicleParameters::from_ros_yaml(&car.vehicle_file(&car.name))?)
+}
+
+/// What it says of motor and brakes.
+pub(crate) fn drivetrain(car: &CarParameters) -> Drivetrain {
+    Drivetrain {
+        drive_mps2: car.drive.drive_limit * reference::GRAVITY_MPS2,
+        brake_mps2: car.drive.brake_limit * reference::GRAVITY_MPS2,
+        power_w_per_kg: car.drive.power_w / car.mass_kg,
+        top_speed_mps: car.top_speed_mps,
+    }
+}
+
+/// A built-in track as a driver reads it.
+pub(crate) fn track(car: &CarParameters, name: &str, reversed: bool) -> Result<Track> {
+    let track = reference::Track::by_name(name, car.track_scale, reversed)?;
+    let width = track.half_width_m();
+    let rows: Vec<[f64; 4]> =
+        track.points().iter().step_by(8).map(|p| [p.x_m, p.y_m, width, width]).collect();
+    Ok(Track::from_points(&rows)?)
+}
+
+/// Length of the ramps: full lock is reached before.
+const RAMP_S: f64 = 15.0;
+/// Slips that a driver has a use for.
+const MOST_SLIP_RAD: f64 = 0.3;
+
+/// A car on a road, with everything that the car has of its own.
+pub(crate) fn scenario(car: &CarParameters, course: Course, mu: f64, seed: u64) -> Scenario {
+    let mut scenario = Scenario::new(car.clone())
+        .course(course)
+        .friction(Friction::Uniform { mu })
+        .duration(36_000.0)
+        .seed(seed);
+    scenario.effects = car.own_effects(mu);
+    scenario
+}
+
+/// The effective tires of the plant on a road: the Magic Formulas nearest to its axle forces over the static loads, steered slowly up to the lock
+/// at constant speed, both ways.
+pub(crate) fn projection(car: &CarParameters, mu: f64) -> Result<PacejkaParameters> {
+    let vehicle = vehicle(car)?;
+    let loads = [vehicle.static_load_front_n(), vehicle.static_load_rear_n()];
+    let mut points: [Vec<(f64, f64)>; 2] = Default::default();
+    for reversed in [false, true] {
+        let course = Course::by_name("ramp_steer", car, reversed)?;
+        let driven = scenario(car, course, mu, 1).duration(RAMP_S);
+        for t in Simulation::new(driven)?.run(|_| {}).truth {
+            let m = &t.motion;
+            let front = m.steering_rad - ((m.v_y_mps + vehicle.l_f_m * m.yaw_rate_radps) / m.v_x_mps).atan();
+            let rear = -((m.v_y_mps - vehicle.l_r_m * m.yaw_rate_radps) / m.v_x_mps).atan();
+            for (axle, slip, force) in [(0, front, t.front_axle_n()[1]), (1, rear, t.rear_axle_n()[1])] {
+                if m.v_x_mps > car.low_speed_mps() && slip.abs() < MOST_SLIP_RAD {
+                    points[axle].push((slip, force / loads[axle]));
+                }
+            }
+        }
+    }
+    let [front, rear] = points.map(|points| nearest(&points));
+    Ok(PacejkaParameters { front: front?, rear: rear? })
+}
+
+fn nearest(points: &[(f64, f64)]) -> Result<MagicFormula> {
+    let config = NelderMeadConfig { max_evaluations: 3000, ..NelderMeadConfig::default() };
+    let axle = |x: &[f64]| MagicFormula { b: x[0], c: x[1], d: x[2], e: x[3] };
+    let cost = |x: &[f64]| {
+        let tire = axle(x);
+        points.iter().step_by(5).map(|&(slip, force)| (tire.normalized_force(slip) - force).powi(2)).sum()
+    };
+    let starts = [[6.0, 1.4, 0.5, 0.0], [10.0, 1.4, 1.0, 0.0], [20.0, 1.6, 0.7, -1.0]];
+    let found =
+        starts.iter().map(|start| minimize(cost, start, &BOUNDS, &config)).collect::<Result<Vec<_>, _>>()?;
+    let best = found.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost)).context("no fit")?;
+    Ok(axle(&best.x))
+}

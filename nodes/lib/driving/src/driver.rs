@@ -1,0 +1,345 @@
+//! The driver: takes tire sets as they come, plans what they allow, steers, and gives way when the road gives less.
+//!
+//! | what is known | grip planned with |
+//! | --- | --- |
+//! | nothing | the start's |
+//! | accepted: the peak is known | a share of the most likely peak, step by step from what the set promises |
+//! | accepted within what was shown | a step beyond what was driven, so that the next drive shows more, up to the most likely peak |
+//! | a prior's peak (provisional) | up to that and to the peak that the data find most likely, in larger steps |
+//! | the car slid, or the identifier warns | what the road gave, until a set knows better |
+
+use std::collections::VecDeque;
+
+use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
+
+use crate::governor::Governor;
+use crate::profile::{Drivetrain, Limits, SpeedProfile};
+use crate::pursuit::{Moment, Pursuit};
+use crate::state::{Asked, CarState, DriveCommand, predict};
+use crate::tires::{SteeringTable, TireSet, Trust, with_peak};
+use crate::{Actuator, DrivingError, Place, Track};
+
+/// How boldly to drive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Share of a known grip to plan with.
+    pub share: f64,
+    /// Grip planned over what was driven without a slide, where the peak is not known; 1: never beyond.
+    pub step: f64,
+    /// The same where a prior says that there is more.
+    pub prior_step: f64,
+    /// Grip planned over what the set promises at most, where the peak is not known: a promise is the lower end of an interval.
+    pub beyond: f64,
+    /// Pursuit.
+    pub pursuit: Pursuit,
+    /// Gain of the speed controller.
+    pub speed_gain_1ps: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            share: 0.98,
+            step: 1.15,
+            prior_step: 1.2,
+            beyond: 1.5,
+            pursuit: Pursuit::default(),
+            speed_gain_1ps: 4.0,
+        }
+    }
+}
+
+/// Delays below this are not worth a prediction.
+const PROMPT_S: f64 = 0.004;
+/// Longest delay that is made up for.
+const LATEST_S: f64 = 0.5;
+/// Share of the most likely peak to explore up to, where it was not reached.
+const LIKELY: f64 = 0.96;
+/// Share of what the road gave when the car slid, to go on with.
+const CAUGHT: f64 = 0.96;
+/// Growth of that with each part of a lap driven, as the slide may have been a puddle.
+const REGAINED: f64 = 1.01;
+/// Share of the grip to go on with after a warning that names no figure.
+const WARNED: f64 = 0.7;
+/// Share of the drive that is always left: cornering alone slows the car.
+const LEAST_DRIVE: f64 = 0.5;
+/// Most that the driver drives against a slide sideways: more upsets a car at its limit.
+const SLIDE_MPS2: f64 = 0.5;
+/// Share of the half width from which the car slows down.
+const WIDE: f64 = 0.6;
+
+/// What is planned with.
+#[derive(Debug, Clone)]
+struct Plan {
+    tires: PacejkaParameters,
+    grip: f64,
+    limits: Limits,
+    profile: SpeedProfile,
+    table: SteeringTable,
+}
+
+/// Drives a car around a track.
+#[derive(Debug, Clone)]
+pub struct Driver {
+    vehicle: VehicleParameters,
+    drivetrain: Drivetrain,
+    track: Track,
+    settings: Settings,
+    start: TireSet,
+    known: Option<TireSet>,
+    prior: Option<TireSet>,
+    /// Grip planned with over the last part of a lap that ended without a slide.
+    driven: f64,
+    /// Grip that the road gave where it was less than planned.
+    caught: Option<f64>,
+    actuator: Actuator,
+    plan: Plan,
+    governor: Governor,
+    trim_rad: f64,
+    place: Option<Place>,
+    asked: VecDeque<Asked>,
+}
+
+impl Driver {
+    /// A driver who knows the start's tires only.
+    ///
+    /// # Errors
+    /// [`DrivingError::Tires`] where the start cannot be driven on.
+    pub fn new(
+        vehicle: VehicleParameters,
+        drivetrain: Drivetrain,
+        track: Track,
+        start: TireSet,
+        settings: Settings,
+    ) -> Result<Self, DrivingError> {
+        start.check()?;
+        let plan = Plan::new(&vehicle, &drivetrain, &track, &start.tires, settings.share * start.grip());
+        Ok(Self {
+            actuator: start.actuator,
+            vehicle,
+            drivetrain,
+            track,
+            settings,
+            start,
+            known: None,
+            prior: None,
+            driven: 0.0,
+            caught: None,
+            plan,
+            governor: Governor::default(),
+            trim_rad: 0.0,
+            place: None,
+            asked: VecDeque::new(),
+        })
+    }
+
+    /// Takes a set. A set of a prior stands beside the one known; any other takes its place.
+    ///
+    /// # Errors
+    /// [`DrivingError::Tires`] for a set that cannot be driven on; the driver keeps what it has.
+    pub fn take(&mut self, set: TireSet) -> Result<(), DrivingError> {
+        set.check()?;
+        match set.trust {
+            Trust::Provisional => self.prior = Some(set),
+            Trust::Assumed => (self.start, self.known) = (set, None),
+            Trust::Accepted | Trust::AcceptedWithin => {
+                // A peak that is known needs no memory of slides.
+                if set.trust == Trust::Accepted {
+                    self.caught = None;
+                }
+                self.known = Some(set);
+            }
+        }
+        self.actuator = set.actuator;
+        self.renew();
+        Ok(())
+    }
+
+    /// The set in use must not be used any more, or its grip has fallen. `share`: what the road gives of what the set promises, where it is known.
+    pub fn warn(&mut self, share: Option<f64>) {
+        let promised = self.known.as_ref().unwrap_or(&self.start).grip();
+        let left = share.filter(|s| (0.05..1.0).contains(s)).unwrap_or(WARNED);
+        self.catch(CAUGHT * left * promised);
+    }
+
+    /// Tells the driver that a part of the lap with all kinds of corners has been driven: what was planned for it is what was driven.
+    pub fn driven(&mut self) {
+        self.caught = self.caught.map(|grip| grip * REGAINED);
+        self.driven = self.plan.grip;
+    }
+
+    /// Grip (acceleration over g) that is planned with.
+    #[must_use]
+    pub fn grip(&self) -> f64 {
+        self.plan.grip
+    }
+
+    /// Whether the plan is held back by a slide or a warning.
+    #[must_use]
+    pub fn held_back(&self) -> bool {
+        self.caught.is_some_and(|caught| caught <= self.plan.grip + 1e-9)
+    }
+
+    /// What the set in use rests on.
+    #[must_use]
+    pub fn trust(&self) -> Trust {
+        self.known.as_ref().unwrap_or(&self.start).trust
+    }
+
+    /// The speed profile of the plan.
+    #[must_use]
+    pub fn profile(&self) -> &SpeedProfile {
+        &self.plan.profile
+    }
+
+    /// The track.
+    #[must_use]
+    pub fn track(&self) -> &Track {
+        &self.track
+    }
+
+    /// Where the car was at the last state.
+    #[must_use]
+    pub fn place(&self) -> Option<Place> {
+        self.place
+    }
+
+    /// The next command, from a state in the order of stamps. A state that is not finite gives the last steering and full braking.
+    pub fn command(&mut self, state: &CarState) -> DriveCommand {
+        if !state.is_finite() {
+            let steering_rad = self.asked.back().map_or(0.0, |a| self.actuated(a.angle_rad));
+            return DriveCommand {
+                steering_rad,
+                speed_mps: 0.0,
+                acceleration_mps2: -self.plan.limits.brake_mps2,
+            };
+        }
+        let place = self.track.place(state.x_m, state.y_m, self.place.map(|p| p.station_m));
+        self.place = Some(place);
+        self.watch(state);
+        let delay_s = self.actuator.delay_s.min(LATEST_S);
+        let (car, then) = if delay_s > PROMPT_S {
+            let car = predict(state, delay_s, &self.asked, &self.vehicle, &self.plan.tires);
+            (car, self.track.place(car.x_m, car.y_m, Some(place.station_m)))
+        } else {
+            (*state, place)
+        };
+        let moment = Moment {
+            car: &car,
+            place: then,
+            track: &self.track,
+            table: &self.plan.table,
+            dt_s: self.asked.back().map_or(0.0, |a| state.stamp_s - a.from_s),
+            wheelbase_m: self.vehicle.wheelbase_m(),
+            l_f_m: self.vehicle.l_f_m,
+        };
+        let most = self.vehicle.max_steering_rad;
+        let angle_rad = self.settings.pursuit.steering_rad(&moment, &mut self.trim_rad).clamp(-most, most);
+        let (speed_mps, acceleration_mps2) = self.longitudinal(state, place, angle_rad);
+        let asked = Asked { from_s: state.stamp_s, angle_rad, acceleration_mps2 };
+        self.asked.push_back(asked);
+        while self.asked.front().is_some_and(|a| a.from_s < state.stamp_s - 2.0 * LATEST_S) {
+            self.asked.pop_front();
+        }
+        DriveCommand { steering_rad: self.actuated(angle_rad), speed_mps, acceleration_mps2 }
+    }
+
+    fn actuated(&self, angle_rad: f64) -> f64 {
+        let most = self.vehicle.max_steering_rad;
+        ((angle_rad - self.actuator.offset_rad) / self.actuator.gain).clamp(-most, most)
+    }
+
+    /// Speed aimed at, and the acceleration towards it.
+    fn longitudinal(&self, state: &CarState, place: Place, angle_rad: f64) -> (f64, f64) {
+        let limits = &self.plan.limits;
+        let point = self.track.at(place.station_m);
+        let width = if place.offset_m > 0.0 { point.left_m } else { point.right_m };
+        let wide = (place.offset_m.abs() / width - WIDE).max(0.0);
+        let room = (1.0 - 0.5 * wide).max(0.5);
+        let (speed_mps, slope) = self.plan.profile.at(place.station_m);
+        let speed_mps = speed_mps * room;
+        let turned = state.v_x_mps * state.yaw_rate_radps;
+        // Front tires that steer and a body that slides sideways hold the car back.
+        let slide = -state.v_y_mps * state.yaw_rate_radps;
+        let scrub = slide.clamp(-SLIDE_MPS2, SLIDE_MPS2)
+            + (self.vehicle.l_r_m / self.vehicle.wheelbase_m() * turned * angle_rad.sin()).max(0.0);
+        let wanted = slope * room + scrub + self.settings.speed_gain_1ps * (speed_mps - state.v_x_mps);
+        let left = limits.left_beside(turned);
+        let drive =
+            limits.drive_at_mps2(state.v_x_mps) * left.max(LEAST_DRIVE) * if wide > 0.0 { 0.5 } else { 1.0 };
+        (speed_mps, wanted.clamp(-limits.brake_mps2 * left.max(0.15), drive))
+    }
+
+    fn watch(&mut self, state: &CarState) {
+        let then_s = state.stamp_s - self.actuator.delay_s;
+        let acting = self.asked.iter().rev().find(|a| a.from_s <= then_s + 1e-9);
+        let Some(acting) = acting.map(|a| (a.angle_rad, a.acceleration_mps2)) else { return };
+        if state.v_x_mps < 1.0 {
+            self.governor.reset();
+            return;
+        }
+        if let Some(given) = self.governor.look(state, acting, &self.vehicle, &self.plan.tires) {
+            self.catch(CAUGHT * given);
+        }
+    }
+
+    fn catch(&mut self, grip: f64) {
+        self.caught = Some(self.caught.map_or(grip, |before| before.min(grip)).max(0.05));
+        self.renew();
+    }
+
+    /// Grip to plan with.
+    fn allowed(&self) -> f64 {
+        let Settings { share, step, prior_step, beyond, .. } = self.settings;
+        let base = self.known.as_ref().unwrap_or(&self.start);
+        let shown = base.grip();
+        let driven = self.driven.max(share * shown);
+        let likely = base.likely_peak.unwrap_or(f64::INFINITY);
+        let bold = (step * driven).min(beyond * shown);
+        let alone = match base.trust {
+            Trust::Assumed => share * shown,
+            Trust::Accepted => bold.min(share * base.likely_peak.unwrap_or(shown)).max(share * shown),
+            Trust::AcceptedWithin => bold.min(LIKELY * likely).max(share * shown),
+            Trust::Provisional => share * shown,
+        };
+        let grip = match &self.prior {
+            _ if base.trust == Trust::Accepted => alone,
+            // A prior below what was driven and a step is no reason to drive slower, unless nothing was shown.
+            Some(prior) if base.trust == Trust::Assumed => (share * prior.grip()).min(prior_step * driven),
+            Some(prior) => {
+                (share * prior.grip()).min(likely).max(alone).min(prior_step * driven).min(beyond * shown)
+            }
+            None => alone,
+        };
+        self.caught.map_or(grip, |caught| grip.min(caught))
+    }
+
+    fn renew(&mut self) {
+        let base = self.known.as_ref().or(self.prior.as_ref()).unwrap_or(&self.start);
+        let tires = base.tires;
+        self.plan = Plan::new(&self.vehicle, &self.drivetrain, &self.track, &tires, self.allowed());
+        self.governor.reset();
+    }
+}
+
+impl Plan {
+    /// The tires with their weaker peak a little above what is planned, so that the plan stays below it.
+    fn new(
+        vehicle: &VehicleParameters,
+        drivetrain: &Drivetrain,
+        track: &Track,
+        tires: &PacejkaParameters,
+        grip: f64,
+    ) -> Self {
+        let peak = tires.front.d.min(tires.rear.d).max(grip);
+        let tires = if grip > 0.9 * peak { with_peak(tires, peak) } else { with_peak(tires, grip / 0.9) };
+        let limits = Limits::new(vehicle, grip, drivetrain);
+        Self {
+            profile: SpeedProfile::new(track, &limits),
+            table: SteeringTable::new(vehicle, &tires),
+            tires,
+            grip,
+            limits,
+        }
+    }
+}

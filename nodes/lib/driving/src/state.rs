@@ -1,0 +1,93 @@
+//! What goes into a driver and comes out, and the car a moment later.
+
+use std::collections::VecDeque;
+
+use gripsight_vehicle::{Input, PacejkaParameters, SingleTrack, State, VehicleParameters};
+
+/// What odometry says of the car.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CarState {
+    /// When.
+    pub stamp_s: f64,
+    /// Position of the centre of gravity.
+    pub x_m: f64,
+    /// Position of the centre of gravity.
+    pub y_m: f64,
+    /// Heading.
+    pub heading_rad: f64,
+    /// Forward speed.
+    pub v_x_mps: f64,
+    /// Speed to the left.
+    pub v_y_mps: f64,
+    /// Yaw rate.
+    pub yaw_rate_radps: f64,
+}
+
+impl CarState {
+    /// Whether all fields are finite.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        let Self { stamp_s, x_m, y_m, heading_rad, v_x_mps, v_y_mps, yaw_rate_radps } = *self;
+        [stamp_s, x_m, y_m, heading_rad, v_x_mps, v_y_mps, yaw_rate_radps].iter().all(|v| v.is_finite())
+    }
+
+    /// Direction of travel.
+    pub(crate) fn course_rad(&self) -> f64 {
+        self.heading_rad + self.v_y_mps.atan2(self.v_x_mps.max(0.1))
+    }
+}
+
+/// What a driver asks of the car.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct DriveCommand {
+    /// Steering command, as the actuator takes it.
+    pub steering_rad: f64,
+    /// Speed aimed at.
+    pub speed_mps: f64,
+    /// Longitudinal acceleration, feed-forward and feedback together.
+    pub acceleration_mps2: f64,
+}
+
+/// A road-wheel angle asked from a stamp on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Asked {
+    pub(crate) from_s: f64,
+    pub(crate) angle_rad: f64,
+    pub(crate) acceleration_mps2: f64,
+}
+
+/// The car `ahead_s` later, by the single-track model with the commands that are still on their way.
+pub(crate) fn predict(
+    now: &CarState,
+    ahead_s: f64,
+    asked: &VecDeque<Asked>,
+    vehicle: &VehicleParameters,
+    tires: &PacejkaParameters,
+) -> CarState {
+    const STEP_S: f64 = 0.01;
+    const SUBSTEP_S: f64 = 0.002;
+    let car = SingleTrack::new(vehicle, tires);
+    let mut at = *now;
+    let steps = (ahead_s / STEP_S).ceil();
+    let dt_s = ahead_s / steps.max(1.0);
+    for _ in 0..steps as usize {
+        // What acts at this instant was asked one delay before.
+        let then_s = at.stamp_s - ahead_s;
+        let acting = asked.iter().rev().find(|a| a.from_s <= then_s + 1e-9);
+        let acting = acting.or_else(|| asked.front());
+        let (angle_rad, a_x) = acting.map_or((0.0, 0.0), |a| (a.angle_rad, a.acceleration_mps2));
+        let input = Input { v_x_mps: at.v_x_mps, steering_rad: angle_rad };
+        let from = State { v_y_mps: at.v_y_mps, yaw_rate_radps: at.yaw_rate_radps };
+        let to = car.step(from, &input, &input, dt_s, SUBSTEP_S);
+        let v_y = 0.5 * (from.v_y_mps + to.v_y_mps);
+        let heading = at.heading_rad + 0.25 * dt_s * (from.yaw_rate_radps + to.yaw_rate_radps);
+        let (sin, cos) = heading.sin_cos();
+        at.x_m += dt_s * (at.v_x_mps * cos - v_y * sin);
+        at.y_m += dt_s * (at.v_x_mps * sin + v_y * cos);
+        at.heading_rad += 0.5 * dt_s * (from.yaw_rate_radps + to.yaw_rate_radps);
+        at.v_x_mps = (at.v_x_mps + dt_s * a_x).max(0.0);
+        (at.v_y_mps, at.yaw_rate_radps) = (to.v_y_mps, to.yaw_rate_radps);
+        at.stamp_s += dt_s;
+    }
+    at
+}

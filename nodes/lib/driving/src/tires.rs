@@ -1,0 +1,241 @@
+//! A tire set as a driver takes it, and what steering it asks for.
+//!
+//! In a steady turn both axles carry the same share of the lateral acceleration a (paper eq. 3, 4 and 14):
+//!
+//! ```text
+//! n_f(alpha_f) cos d = n_r(alpha_r) = a/g
+//! tan(d - alpha_f) + tan(alpha_r)   = L a/v^2
+//! ```
+//!
+//! | symbol | meaning | unit |
+//! | --- | --- | --- |
+//! | n_f, n_r | F_y/F_z of the axles | 1 |
+//! | alpha_f, alpha_r | slip angles | rad |
+//! | d | road-wheel angle | rad |
+//! | v, L | speed, wheelbase | m/s, m |
+//!
+//! The slips depend on a alone, so the table has one column for each axle instead of one for each speed; the second line then gives the angle
+//! exactly. Model- and acceleration-based pursuit (Becker et al., arXiv 2209.04346) reads the same relation from a two-dimensional table.
+
+use gripsight_vehicle::{GRAVITY_MPS2, MagicFormula, PacejkaParameters, VehicleParameters};
+
+use crate::DrivingError;
+
+/// Rows of the slip table.
+const ROWS: usize = 200;
+/// Share of the largest force that the table goes up to: at the peak itself the slip is not defined.
+const MOST: f64 = 0.995;
+
+/// What a set may be used for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Trust {
+    /// Nobody measured it: what the driver starts with.
+    Assumed,
+    /// The peak of both axles is known.
+    Accepted,
+    /// No force beyond what was shown.
+    AcceptedWithin,
+    /// The peak rests on a friction prior.
+    Provisional,
+}
+
+/// From the steering asked to the command: `command(t) = (angle(t + delay) - offset)/gain`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Actuator {
+    /// From the command to the road wheels, lag included.
+    pub delay_s: f64,
+    /// Road-wheel angle over command.
+    pub gain: f64,
+    /// Road-wheel angle at command zero.
+    pub offset_rad: f64,
+}
+
+impl Default for Actuator {
+    fn default() -> Self {
+        Self { delay_s: 0.0, gain: 1.0, offset_rad: 0.0 }
+    }
+}
+
+/// A Phi_p set with what it is good for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TireSet {
+    /// The effective tires.
+    pub tires: PacejkaParameters,
+    /// What they may be used for.
+    pub trust: Trust,
+    /// Slips up to which the set is valid, front and rear, rad; infinite or NaN where not stated.
+    pub valid_slip_rad: [f64; 2],
+    /// Most likely peak over the load of the weaker axle, where somebody says; the set itself may promise less.
+    pub likely_peak: Option<f64>,
+    /// The steering actuator as identified with them.
+    pub actuator: Actuator,
+}
+
+impl TireSet {
+    /// A set without limits of its own.
+    #[must_use]
+    pub fn assumed(tires: PacejkaParameters) -> Self {
+        let valid_slip_rad = [f64::INFINITY; 2];
+        Self {
+            tires,
+            trust: Trust::Assumed,
+            valid_slip_rad,
+            likely_peak: None,
+            actuator: Actuator::default(),
+        }
+    }
+
+    /// The tires that a stack starts from where nothing is known: the paper's mismatched start, D = 0.51.
+    #[must_use]
+    pub fn start() -> Self {
+        let axle = MagicFormula::from_stiffness(6.0, 1.4, 0.51, 0.0);
+        Self::assumed(PacejkaParameters { front: axle, rear: axle })
+    }
+
+    /// Lateral acceleration over g that the set promises: the weaker axle's largest force within the valid slips.
+    #[must_use]
+    pub fn grip(&self) -> f64 {
+        let axle = |tire: &MagicFormula, valid_rad: f64| {
+            tire.max_force_within(if valid_rad > 0.0 { valid_rad } else { f64::INFINITY }.min(1.5))
+        };
+        axle(&self.tires.front, self.valid_slip_rad[0]).min(axle(&self.tires.rear, self.valid_slip_rad[1]))
+    }
+
+    /// Checks that the set can be driven on.
+    ///
+    /// # Errors
+    /// [`DrivingError::Tires`] with the figure that is wrong.
+    pub fn check(&self) -> Result<(), DrivingError> {
+        let grip = self.grip();
+        let stiff = [self.tires.front, self.tires.rear].map(|t| t.normalized_stiffness());
+        let Actuator { delay_s, gain, offset_rad } = self.actuator;
+        if !(self.tires.is_finite() && grip > 0.01 && stiff.iter().all(|&k| k > 0.1)) {
+            return Err(DrivingError::Tires(format!("grip {grip}, stiffness over load {stiff:?} 1/rad")));
+        }
+        if !((0.0..1.0).contains(&delay_s) && gain > 0.1 && gain.is_finite() && offset_rad.abs() < 0.5) {
+            return Err(DrivingError::Tires(format!(
+                "steering delay {delay_s} s, gain {gain}, offset {offset_rad} rad"
+            )));
+        }
+        Ok(())
+    }
+}
+
+/// The same tires with another peak: stiffness and shape stay.
+pub(crate) fn with_peak(tires: &PacejkaParameters, grip: f64) -> PacejkaParameters {
+    let weaker = tires.front.d.min(tires.rear.d);
+    let axle = |t: &MagicFormula| {
+        MagicFormula::from_stiffness(t.normalized_stiffness(), t.c, t.d * grip / weaker, t.e)
+    };
+    PacejkaParameters { front: axle(&tires.front), rear: axle(&tires.rear) }
+}
+
+/// The steering table of a car on some tires.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SteeringTable {
+    wheelbase_m: f64,
+    most: f64,
+    front_rad: Vec<f64>,
+    rear_rad: Vec<f64>,
+}
+
+impl SteeringTable {
+    /// From the tires.
+    #[must_use]
+    pub fn new(vehicle: &VehicleParameters, tires: &PacejkaParameters) -> Self {
+        let peak_rad = |tire: &MagicFormula| tire.peak_slip_rad().unwrap_or(1.5);
+        let (front, rear) = (peak_rad(&tires.front), peak_rad(&tires.rear));
+        let most =
+            MOST * tires.front.normalized_force(front).min(tires.rear.normalized_force(rear)).max(1e-3);
+        let column = |tire: &MagicFormula, peak_rad: f64| {
+            let share = |k: usize| most * k as f64 / (ROWS - 1) as f64;
+            (0..ROWS).map(|k| slip_of(tire, share(k), peak_rad)).collect()
+        };
+        Self {
+            wheelbase_m: vehicle.wheelbase_m(),
+            most,
+            front_rad: column(&tires.front, front),
+            rear_rad: column(&tires.rear, rear),
+        }
+    }
+
+    /// Largest lateral acceleration of the table.
+    #[must_use]
+    pub fn most_mps2(&self) -> f64 {
+        self.most * GRAVITY_MPS2
+    }
+
+    /// Road-wheel angle of a steady turn; beyond the largest acceleration that of the largest.
+    #[must_use]
+    pub fn steering_rad(&self, lateral_mps2: f64, speed_mps: f64) -> f64 {
+        let over_g = (lateral_mps2.abs() / GRAVITY_MPS2).min(self.most);
+        let speed = speed_mps.max(0.1);
+        let turn = self.wheelbase_m * over_g * GRAVITY_MPS2 / (speed * speed);
+        let rear_rad = self.slip(&self.rear_rad, over_g);
+        let mut angle_rad = 0.0_f64;
+        for _ in 0..8 {
+            let front_rad = self.slip(&self.front_rad, over_g / angle_rad.cos().max(0.5));
+            angle_rad = (front_rad + (turn - rear_rad.tan()).atan()).clamp(-1.2, 1.2);
+        }
+        angle_rad.copysign(lateral_mps2 * angle_rad)
+    }
+
+    /// Slip angles (front, rear) of a steady turn; beyond the largest acceleration those of the largest.
+    #[must_use]
+    pub fn slips_rad(&self, lateral_mps2: f64) -> (f64, f64) {
+        let over_g = lateral_mps2.abs() / GRAVITY_MPS2;
+        let signed = |slip: f64| slip.copysign(lateral_mps2);
+        (signed(self.slip(&self.front_rad, over_g)), signed(self.slip(&self.rear_rad, over_g)))
+    }
+
+    fn slip(&self, column: &[f64], over_g: f64) -> f64 {
+        let place = (over_g / self.most).clamp(0.0, 1.0) * (ROWS - 1) as f64;
+        let row = (place.floor() as usize).min(ROWS - 2);
+        column[row] + (place - row as f64) * (column[row + 1] - column[row])
+    }
+}
+
+/// Slip below the peak at which a tire gives a force.
+fn slip_of(tire: &MagicFormula, force: f64, peak_rad: f64) -> f64 {
+    let (mut low, mut high) = (0.0, peak_rad);
+    for _ in 0..50 {
+        let middle = 0.5 * (low + high);
+        if tire.normalized_force(middle) < force {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_of_a_set_hold_its_grip() {
+        let mut set = TireSet::start();
+        approx::assert_relative_eq!(set.grip(), 0.51, max_relative = 1e-3);
+        set.valid_slip_rad = [0.02, f64::NAN];
+        approx::assert_relative_eq!(set.grip(), set.tires.front.normalized_force(0.02));
+        set.check().unwrap();
+        set.tires.front.d = f64::NAN;
+        assert!(set.check().unwrap_err().to_string().contains("NaN"));
+        let late = Actuator { delay_s: 2.0, ..Actuator::default() };
+        let set = TireSet { actuator: late, ..TireSet::start() };
+        assert!(set.check().unwrap_err().to_string().contains("delay 2 s"));
+    }
+
+    #[test]
+    fn another_peak_keeps_the_stiffness() {
+        let start = TireSet::start().tires;
+        let more = with_peak(&start, 0.9);
+        approx::assert_relative_eq!(more.front.d, 0.9, max_relative = 1e-12);
+        approx::assert_relative_eq!(
+            more.rear.normalized_stiffness(),
+            start.rear.normalized_stiffness(),
+            max_relative = 1e-12
+        );
+    }
+}

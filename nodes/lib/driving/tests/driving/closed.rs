@@ -1,0 +1,170 @@
+//! The driver on a single-track car: what it does with sets, warnings, delays and less grip than planned.
+
+use gripsight_driving::{
+    Actuator, CarState, DriveCommand, Driver, Drivetrain, Settings, TireSet, Track, Trust,
+};
+use gripsight_vehicle::{Input, MagicFormula, PacejkaParameters, SingleTrack, State, VehicleParameters};
+
+const DRIVETRAIN: Drivetrain =
+    Drivetrain { drive_mps2: 6.0, brake_mps2: 8.0, power_w_per_kg: 60.0, top_speed_mps: 8.0 };
+
+/// A bean of about 60 m.
+fn track() -> Track {
+    let row = |k: i32| {
+        let p = f64::from(k) * std::f64::consts::TAU / 120.0;
+        let radius = 9.0 * (1.0 + 0.25 * (2.0 * p).cos() + 0.08 * (3.0 * p).sin());
+        [radius * p.cos(), radius * p.sin(), 0.4, 0.4]
+    };
+    Track::from_points(&(0..120).map(row).collect::<Vec<_>>()).unwrap()
+}
+
+fn tires(grip: f64) -> PacejkaParameters {
+    let axle = |k: f64| MagicFormula::from_stiffness(k, 1.5, grip, 0.0);
+    PacejkaParameters { front: axle(9.0), rear: axle(10.5) }
+}
+
+fn set(grip: f64, trust: Trust) -> TireSet {
+    TireSet { trust, ..TireSet::assumed(tires(grip)) }
+}
+
+fn driver(start: TireSet) -> Driver {
+    Driver::new(VehicleParameters::f1tenth(), DRIVETRAIN, track(), start, Settings::default()).unwrap()
+}
+
+/// Drives `duration_s` on tires of a grip, the steering late by `delay_s`; the largest distance to the line after 3 s.
+fn drive(driver: &mut Driver, grip: impl Fn(f64) -> f64, delay_s: f64, duration_s: f64) -> f64 {
+    const DT_S: f64 = 0.01;
+    let vehicle = VehicleParameters::f1tenth();
+    let at = driver.track().at(0.0);
+    let mut car = CarState {
+        stamp_s: 0.0,
+        x_m: at.x_m,
+        y_m: at.y_m,
+        heading_rad: at.heading_rad,
+        v_x_mps: 2.0,
+        v_y_mps: 0.0,
+        yaw_rate_radps: 0.0,
+    };
+    let late = (delay_s / DT_S).round() as usize;
+    let mut commands = vec![DriveCommand::default(); late];
+    let mut worst_m = 0.0_f64;
+    for step in 0..(duration_s / DT_S) as usize {
+        commands.push(driver.command(&car));
+        let (steering, a_x) = (commands[step].steering_rad, commands[step + late].acceleration_mps2);
+        let model = SingleTrack::new(&vehicle, &tires(grip(car.stamp_s)));
+        let input = Input { v_x_mps: car.v_x_mps, steering_rad: steering };
+        let from = State { v_y_mps: car.v_y_mps, yaw_rate_radps: car.yaw_rate_radps };
+        let to = model.step(from, &input, &input, DT_S, 0.002);
+        let (sin, cos) = (car.heading_rad + 0.5 * DT_S * to.yaw_rate_radps).sin_cos();
+        let scrub = model.lateral_forces_n(&from, &input).0 * steering.sin() / vehicle.mass_kg;
+        car.x_m += DT_S * (car.v_x_mps * cos - to.v_y_mps * sin);
+        car.y_m += DT_S * (car.v_x_mps * sin + to.v_y_mps * cos);
+        car.heading_rad += DT_S * to.yaw_rate_radps;
+        car.v_x_mps = (car.v_x_mps + DT_S * (a_x - scrub + to.v_y_mps * to.yaw_rate_radps)).max(0.5);
+        (car.v_y_mps, car.yaw_rate_radps) = (to.v_y_mps, to.yaw_rate_radps);
+        car.stamp_s += DT_S;
+        if car.stamp_s > 3.0 {
+            worst_m = worst_m.max(driver.place().unwrap().offset_m.abs());
+        }
+    }
+    worst_m
+}
+
+#[test]
+fn pursuit_holds_the_line_on_the_right_tires() {
+    let mut driver = driver(set(0.8, Trust::Accepted));
+    let worst_m = drive(&mut driver, |_| 0.8, 0.0, 25.0);
+    assert!(worst_m < 0.25, "{worst_m}");
+    assert!(!driver.held_back());
+}
+
+#[test]
+fn pursuit_holds_the_line_on_the_start_s_tires_where_there_is_more_grip() {
+    let worst_m = drive(&mut driver(TireSet::start()), |_| 0.8, 0.0, 25.0);
+    assert!(worst_m < 0.3, "{worst_m}");
+}
+
+#[test]
+fn a_known_delay_is_made_up_for() {
+    const DELAY_S: f64 = 0.15;
+    let told = |delay_s: f64| TireSet {
+        actuator: Actuator { delay_s, ..Actuator::default() },
+        ..set(0.7, Trust::Accepted)
+    };
+    let with = drive(&mut driver(told(DELAY_S)), |_| 0.8, DELAY_S, 25.0);
+    let without = drive(&mut driver(told(0.0)), |_| 0.8, DELAY_S, 25.0);
+    assert!(with < 0.25 && with < 0.6 * without, "{with} m with the delay known, {without} m without");
+}
+
+#[test]
+fn less_grip_than_planned_is_noticed() {
+    let mut driver = driver(set(0.9, Trust::Accepted));
+    drive(&mut driver, |time_s| if time_s < 6.0 { 0.9 } else { 0.6 }, 0.0, 20.0);
+    assert!(driver.held_back());
+    assert!((0.4..0.65).contains(&driver.grip()), "{}", driver.grip());
+}
+
+#[test]
+fn sets_are_taken_for_what_they_are_good_for() {
+    let settings = Settings::default();
+    let start = driver(TireSet::start()).grip();
+    approx::assert_relative_eq!(start, settings.share * 0.51, max_relative = 1e-2);
+
+    // The peak is known: its share.
+    let mut known = driver(TireSet::start());
+    known.take(set(0.8, Trust::Accepted)).unwrap();
+    approx::assert_relative_eq!(known.grip(), settings.share * 0.8, max_relative = 1e-2);
+
+    // It is not: a step beyond what was driven, but not beyond what is likely.
+    let mut within = driver(TireSet::start());
+    within.driven();
+    within.take(set(0.48, Trust::AcceptedWithin)).unwrap();
+    approx::assert_relative_eq!(within.grip(), settings.step * start, max_relative = 1e-2);
+    within.take(TireSet { likely_peak: Some(0.55), ..set(0.48, Trust::AcceptedWithin) }).unwrap();
+    approx::assert_relative_eq!(within.grip(), 0.96 * 0.55, max_relative = 1e-2);
+
+    // A prior that promises more: a larger step and no more than that. One that promises less is no reason to slow down.
+    for (prior, expected) in [(2.0, settings.prior_step * start), (0.3, settings.step * start)] {
+        let mut driver = driver(TireSet::start());
+        driver.driven();
+        driver.take(set(0.48, Trust::AcceptedWithin)).unwrap();
+        driver.take(set(prior, Trust::Provisional)).unwrap();
+        approx::assert_relative_eq!(driver.grip(), expected, max_relative = 1e-2);
+    }
+}
+
+#[test]
+fn a_warning_slows_at_once_and_a_known_peak_ends_it() {
+    let mut driver = driver(set(0.8, Trust::Accepted));
+    let before_s = driver.profile().lap_time_s();
+    driver.warn(Some(0.6));
+    assert!(driver.grip() < 0.5, "{}", driver.grip());
+    assert!(driver.profile().lap_time_s() > 1.2 * before_s);
+    // The same warning again is no news.
+    let held = driver.grip();
+    driver.warn(Some(0.6));
+    assert_eq!(driver.grip(), held);
+    driver.take(set(0.7, Trust::Accepted)).unwrap();
+    approx::assert_relative_eq!(driver.grip(), 0.98 * 0.7, max_relative = 1e-2);
+    driver.warn(None);
+    assert!(driver.grip() < 0.55);
+}
+
+#[test]
+fn nonsense_changes_nothing() {
+    let mut driver = driver(set(0.8, Trust::Accepted));
+    let grip = driver.grip();
+    assert!(driver.take(set(f64::NAN, Trust::Accepted)).is_err());
+    assert_eq!(driver.grip(), grip);
+    let lost = CarState {
+        stamp_s: 0.0,
+        x_m: f64::NAN,
+        y_m: 0.0,
+        heading_rad: 0.0,
+        v_x_mps: 3.0,
+        v_y_mps: 0.0,
+        yaw_rate_radps: 0.0,
+    };
+    let command = driver.command(&lost);
+    assert!(command.acceleration_mps2 < 0.0 && command.speed_mps == 0.0);
+}
