@@ -106,6 +106,7 @@ fn differences(engine: &Engine<'_>, earlier: &Inferred) -> Vec<Term> {
     }
     for site in Site::ALL {
         let range = earlier.columns.of_site(site);
+        let weight = decisions::PRIOR / range.len() as f64;
         let prior = |column: usize| ColumnPrior {
             offset: 0.0,
             sigma: vec![
@@ -114,8 +115,11 @@ fn differences(engine: &Engine<'_>, earlier: &Inferred) -> Vec<Term> {
             ],
             bounds: unbounded,
         };
-        let priors = range.clone().map(prior).collect();
-        out.push(Term { from: n + range.start, priors, log_weights: weights() });
+        out.extend(range.clone().map(|column| Term {
+            from: n + column,
+            priors: vec![prior(column)],
+            log_weights: vec![(1.0 - weight).ln(), weight.ln()],
+        }));
     }
     out
 }
@@ -137,7 +141,8 @@ impl Compared {
 
     /// Probability that something differs at a site that no effect of the library does.
     fn of_site(&self, earlier: &Inferred, site: Site) -> f64 {
-        self.probability(earlier.term_of_site(site))
+        let terms = earlier.terms_of_site(site);
+        self.selection.probability_that(|c| c[self.terms..][terms.clone()].iter().any(|&a| a > 0))
     }
 
     /// Parameters of an effect in the earlier drive.

@@ -1,6 +1,7 @@
 //! From probabilities to statements: how likely each effect is, what the data cannot tell apart, how large each is, and the answer by site.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use gripsight_estimation::selection::{Term, configuration};
 use gripsight_estimation::{Estimate, bootstrap};
@@ -128,9 +129,9 @@ pub(crate) fn sites(inferred: &Inferred) -> Vec<SiteAnswer> {
                 .filter(|e| e.spec().sites.contains(&site) && inferred.is_open(*e))
                 .collect();
             let terms: Vec<usize> = here.iter().filter_map(|e| inferred.term_of(*e)).collect();
-            let other = inferred.term_of_site(site);
+            let other = inferred.terms_of_site(site);
             let counted =
-                inferred.selection.probability_that(|c| c[other] > 0 || terms.iter().any(|&t| c[t] > 0));
+                inferred.selection.probability_that(|c| terms.iter().copied().chain(other.clone()).any(|t| c[t] > 0));
             let likeliest = here.iter().map(|e| inferred.probability(*e)).fold(0.0, f64::max);
             let probability = counted.max(likeliest);
             let mut mechanisms: Vec<MechanismAnswer> = here
@@ -140,7 +141,7 @@ pub(crate) fn sites(inferred: &Inferred) -> Vec<SiteAnswer> {
                 .collect();
             mechanisms.sort_by(|a, b| b.probability.total_cmp(&a.probability));
             let [closed, by_mechanisms] = if probability >= decisions::LISTED {
-                shares.as_ref().map_or([Estimate::UNKNOWN; 2], |s| s.closed(inferred, &terms, other))
+                shares.as_ref().map_or([Estimate::UNKNOWN; 2], |s| s.closed(inferred, &terms, other.clone()))
             } else {
                 [Estimate::UNKNOWN; 2]
             };
@@ -150,7 +151,7 @@ pub(crate) fn sites(inferred: &Inferred) -> Vec<SiteAnswer> {
                 probability,
                 closed_fraction: closed,
                 mechanisms,
-                other_probability: inferred.confirmed[other],
+                other_probability: inferred.other(site),
                 unexplained_fraction: unexplained,
             }
         })
@@ -184,7 +185,7 @@ impl Shares {
     }
 
     /// What a site closes of what everything together does; and its mechanisms alone.
-    fn closed(&self, inferred: &Inferred, mechanisms: &[usize], other: usize) -> [Estimate; 2] {
+    fn closed(&self, inferred: &Inferred, mechanisms: &[usize], other: Range<usize>) -> [Estimate; 2] {
         let with = |terms: &mut dyn Iterator<Item = usize>| {
             let mut chosen = vec![0; inferred.terms.len()];
             terms.for_each(|t| chosen[t] = inferred.selection.best[t]);
@@ -197,7 +198,7 @@ impl Shares {
                 })
             })
         };
-        [with(&mut mechanisms.iter().copied().chain([other])), with(&mut mechanisms.iter().copied())]
+        [with(&mut mechanisms.iter().copied().chain(other)), with(&mut mechanisms.iter().copied())]
     }
 }
 

@@ -223,10 +223,16 @@ impl Inferred {
         self.columns.effects.iter().position(|e| *e == effect).map(|i| FIRST + i)
     }
 
-    /// Place of a site's flexible terms among the terms.
-    pub(crate) fn term_of_site(&self, site: Site) -> usize {
-        let place = Site::ALL.iter().position(|s| *s == site).unwrap_or(0);
-        FIRST + self.columns.effects.len() + place
+    /// Places of a site's flexible terms among the terms.
+    pub(crate) fn terms_of_site(&self, site: Site) -> std::ops::Range<usize> {
+        let range = self.columns.of_site(site);
+        self.columns.term_of_flexible(range.start)..self.columns.term_of_flexible(range.end)
+    }
+
+    /// Probability that something is the matter at a site that no effect of the library does.
+    pub(crate) fn other(&self, site: Site) -> f64 {
+        let terms = self.terms_of_site(site);
+        self.selection.probability_that(|c| c[terms.clone()].iter().any(|&a| a > 0))
     }
 
     /// Whether the data were asked for an effect.
@@ -332,16 +338,16 @@ fn terms(engine: &Engine<'_>, columns: &Columns, values: &[f64], library: &[Effe
     }
     for site in Site::ALL {
         let range = columns.of_site(site);
-        let priors = range
-            .clone()
-            .map(|column| ColumnPrior {
+        let prior = decisions::PRIOR / range.len() as f64;
+        for column in range.clone() {
+            let prior_of = ColumnPrior {
                 offset: -values[column],
                 sigma: vec![decisions::usual_flexible(site, column - range.start), decisions::FLEXIBLE_WIDE],
                 bounds: [f64::NEG_INFINITY, f64::INFINITY],
-            })
-            .collect();
-        let log_weights = vec![(1.0 - decisions::PRIOR).ln(), decisions::PRIOR.ln()];
-        out.push(Term { from: range.start, priors, log_weights });
+            };
+            let log_weights = vec![(1.0 - prior).ln(), prior.ln()];
+            out.push(Term { from: column, priors: vec![prior_of], log_weights });
+        }
     }
     out
 }
@@ -377,14 +383,12 @@ fn refined(around: &Around<'_, '_>, chosen: &[usize], step: &DVector<f64>) -> Re
     for &e in columns.effects.iter().filter(|e| effect_is_in(**e)) {
         in_use[columns.of_effect(e).unwrap_or(0..0)].fill(true);
     }
-    for (i, site) in Site::ALL.into_iter().enumerate() {
-        if chosen[FIRST + columns.effects.len() + i] > 0 {
-            in_use[columns.of_site(site)].fill(true);
-        }
+    let first_flexible = columns.first_flexible();
+    for (column, used) in in_use.iter_mut().enumerate().skip(first_flexible) {
+        *used = chosen[columns.term_of_flexible(column)] > 0;
     }
     let sites: Vec<Site> = Site::ALL.into_iter().filter(|s| columns.of_site(*s).any(|c| in_use[c])).collect();
     let mut target = columns.blank(engine);
-    let first_flexible = columns.of_site(Site::ALL[0]).start;
     let mut parameters = Vec::new();
     let term_of =
         |column: usize| terms.iter().position(|t| (t.from..t.from + t.priors.len()).contains(&column));
@@ -597,7 +601,7 @@ mod tests {
         let found = inferred(0.0, &[]);
         assert!(found.columns.effects.iter().all(|e| found.probability(*e) < 0.5), "{:?}", found.confirmed);
         assert!(
-            Site::ALL.iter().all(|s| found.confirmed[found.term_of_site(*s)] < 0.5),
+            Site::ALL.iter().all(|s| found.other(*s) < 0.5),
             "{:?}",
             found.confirmed
         );
@@ -610,7 +614,7 @@ mod tests {
         let (size, sigma) = found.size(EffectId::SteeringLag);
         assert!((size[0] - 0.06).abs() < 0.01 && sigma[0] < 0.01, "{size:?} {sigma:?}");
         let without = inferred(0.06, &[EffectId::SteeringLag, EffectId::SteeringDelay]);
-        let steering = without.confirmed[without.term_of_site(Site::Steering)];
+        let steering = without.other(Site::Steering);
         assert!(steering > 0.9, "{:?}", without.confirmed);
         assert!([EffectId::VyBias, EffectId::GyroScale].iter().all(|e| without.probability(*e) < 0.5));
     }

@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::engine::{Engine, ROBUST_K};
+use crate::infer::FIRST;
 use gripsight_estimation::Windows;
 use gripsight_estimation::selection::Quadratic;
 use gripsight_model::EffectId;
@@ -47,6 +48,16 @@ impl Columns {
     pub(crate) fn of_site(&self, site: Site) -> Range<usize> {
         let found = self.site_columns.iter().find(|(r, _)| *r == site);
         found.map_or(0..0, |(_, range)| range.clone())
+    }
+
+    /// The first flexible column; all after it are flexible.
+    pub(crate) fn first_flexible(&self) -> usize {
+        self.site_columns.first().map_or(BASE, |(_, r)| r.start)
+    }
+
+    /// Place of a flexible column among the terms: each is one of its own, after tires, hold and the effects.
+    pub(crate) fn term_of_flexible(&self, column: usize) -> usize {
+        FIRST + self.effects.len() + column - self.first_flexible()
     }
 
     /// Values with every effect absent and no flexible term.
