@@ -48,8 +48,8 @@ pub(crate) struct Models<'m> {
 /// What models are scored on: the held-out blocks, or another bag.
 #[derive(Debug, Clone)]
 pub(crate) struct Scorer<'a> {
-    engine: Engine<'a>,
-    windows: Windows,
+    pub(crate) engine: Engine<'a>,
+    pub(crate) windows: Windows,
     scored_on: &'static str,
     held_out: bool,
 }

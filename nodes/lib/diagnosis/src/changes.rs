@@ -14,6 +14,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::decisions;
 use crate::engine::Engine;
+
 use crate::graded::Change;
 use crate::infer::Inferred;
 use crate::outcome::EffectParameter;
@@ -130,29 +131,29 @@ impl Compared {
     }
 
     /// Probability that an effect differs.
-    fn of_effect(&self, earlier: &Inferred, effect: EffectId) -> f64 {
+    pub(crate) fn of_effect(&self, earlier: &Inferred, effect: EffectId) -> f64 {
         earlier.term_of(effect).filter(|_| earlier.is_open(effect)).map_or(0.0, |t| self.probability(t))
     }
 
     /// Probability that the tires differ.
-    fn of_tires(&self) -> f64 {
+    pub(crate) fn of_tires(&self) -> f64 {
         self.probability(0)
     }
 
     /// Probability that something differs at a site that no effect of the library does.
-    fn of_site(&self, earlier: &Inferred, site: Site) -> f64 {
+    pub(crate) fn of_site(&self, earlier: &Inferred, site: Site) -> f64 {
         let terms = earlier.terms_of_site(site);
         self.selection.probability_that(|c| c[self.terms..][terms.clone()].iter().any(|&a| a > 0))
     }
 
     /// Parameters of an effect in the earlier drive.
-    fn earlier(&self, earlier: &Inferred, effect: EffectId) -> Option<Vec<f64>> {
+    pub(crate) fn earlier(&self, earlier: &Inferred, effect: EffectId) -> Option<Vec<f64>> {
         let range = earlier.columns.of_effect(effect)?;
         Some(range.map(|c| earlier.values[c] + self.selection.best_step[c]).collect())
     }
 
     /// Differences of an effect's parameters, where it differs, and their standard deviations.
-    fn difference(&self, earlier: &Inferred, effect: EffectId) -> Option<(Vec<f64>, Vec<f64>)> {
+    pub(crate) fn difference(&self, earlier: &Inferred, effect: EffectId) -> Option<(Vec<f64>, Vec<f64>)> {
         let place = self.terms + earlier.term_of(effect)?;
         let wide = self.selection.mean[place].len() - 1;
         Some((self.selection.mean[place][wide].clone(), self.selection.sigma[place][wide].clone()))

@@ -33,3 +33,13 @@ pub(crate) fn usual_flexible(site: Site, term: usize) -> f64 {
     };
     levels.get(term).or(levels.last()).copied().unwrap_or(FLEXIBLE_WIDE)
 }
+
+/// Share of the error on data held out, noise included, that is left without an effect and that it must close to be stated.
+pub(crate) const LEAST_CLOSED: f64 = 0.01;
+
+/// Probability from which an effect is stated as a cause: more likely than not.
+pub(crate) const LIKELY: f64 = 0.5;
+
+/// Share of what free terms explain, as far as it looks like an effect, that the effect must explain: free terms do only roughly what an
+/// unmodelled cause does, and the rest may be blamed on whatever looks like it. Set on the development cases of seeds 4 and 771.
+pub(crate) const LEAST_BESIDE: f64 = 0.3;

@@ -35,6 +35,8 @@ pub(crate) fn mechanisms(
         .map(|&effect| SizedEffect {
             name: effect.name(),
             probability: inferred.probability(effect),
+            accepted: inferred.is_accepted(effect),
+            needed_fraction: inferred.statement(effect).map_or(f64::NAN, |s| s.closes),
             parameters: sizes(&engine, effect, inferred.size(effect)),
             confused_with: confused(inferred, effect).iter().map(|e| e.name()).collect(),
         })
@@ -130,8 +132,9 @@ pub(crate) fn sites(inferred: &Inferred) -> Vec<SiteAnswer> {
                 .collect();
             let terms: Vec<usize> = here.iter().filter_map(|e| inferred.term_of(*e)).collect();
             let other = inferred.terms_of_site(site);
-            let counted =
-                inferred.selection.probability_that(|c| terms.iter().copied().chain(other.clone()).any(|t| c[t] > 0));
+            let counted = inferred
+                .selection
+                .probability_that(|c| terms.iter().copied().chain(other.clone()).any(|t| c[t] > 0));
             let likeliest = here.iter().map(|e| inferred.probability(*e)).fold(0.0, f64::max);
             let probability = counted.max(likeliest);
             let mut mechanisms: Vec<MechanismAnswer> = here

@@ -7,12 +7,12 @@
 
 use std::collections::BTreeMap;
 
-use gripsight_estimation::{Estimate, Windows, split};
+use gripsight_estimation::{Estimate, Windows};
 use gripsight_model::{Flexible, Recording, Site};
 use gripsight_signals::{DataHealth, StateSequence};
 use serde::Serialize;
 
-use crate::budget::large_slip_rad;
+use crate::budget::{Scorer, large_slip_rad};
 use crate::changes::compare;
 use crate::diagnose::{SEARCH_WINDOWS, fit_tires, library};
 use crate::engine::Engine;
@@ -57,6 +57,12 @@ pub struct SizedEffect {
     pub name: &'static str,
     /// Probability that it matters.
     pub probability: f64,
+    /// Whether it is stated as a cause: more likely than not, needed on data held out, and not small beside what looks like it and no effect of
+    /// the library does.
+    pub accepted: bool,
+    /// Share of the error on data held out, noise included, that is left without it and that it closes; unknown (`null`) where it is not in the
+    /// model.
+    pub needed_fraction: f64,
     /// Sizes by name, with 90 % intervals.
     pub parameters: BTreeMap<&'static str, EffectParameter>,
     /// Effects that are there where it is not.
@@ -101,11 +107,12 @@ pub fn graded(
     progress: &mut dyn FnMut(&str),
 ) -> Result<Graded, GapError> {
     let Some(earlier) = earlier else {
-        let recording = prepared(request)?;
-        let fitted = alone(request, &recording, None, progress)?;
+        let usable = prepared(request)?;
+        let recording = &usable.recording;
+        let fitted = alone(request, &usable, None, progress)?;
         return Ok(Graded {
             sites: sites(&fitted),
-            mechanisms: mechanisms(&recording, request.vehicle, &fitted),
+            mechanisms: mechanisms(recording, request.vehicle, &fitted),
             changes: Vec::new(),
             rounds: fitted.rounds,
             dispersion: fitted.dispersion,
@@ -113,46 +120,46 @@ pub fn graded(
     };
     let before = Request { sequence: earlier, held_out: None, ..request.clone() };
     let [first, second] = [prepared(&before)?, prepared(request)?];
-    if first.channels != second.channels || first.has_command != second.has_command {
+    let [one, two] = [&first.recording, &second.recording];
+    if one.channels != two.channels || one.has_command != two.has_command {
         return Err(GapError::Earlier("the two drives do not record the same signals".to_owned()));
     }
     let fitted = alone(&before, &first, None, progress)?;
     progress("comparing the drives");
     let later = alone(request, &second, Some(&fitted), progress)?;
     let compared =
-        compare(&Engine::new(&first, request.vehicle, fitted.tires, TireTrust::drive()), &fitted, &later)
+        compare(&Engine::new(one, request.vehicle, fitted.tires, TireTrust::drive()), &fitted, &later)
             .ok_or(GapError::NotFinite)?;
     Ok(Graded {
         sites: sites(&later),
-        mechanisms: mechanisms(&second, request.vehicle, &later),
+        mechanisms: mechanisms(two, request.vehicle, &later),
         changes: compared.changes(&fitted),
         rounds: fitted.rounds,
         dispersion: fitted.dispersion,
     })
 }
 
-fn prepared(request: &Request<'_>) -> Result<Recording, GapError> {
-    let Usable { recording, .. } = usable(request, &DataHealth::of(request.sequence)?)?;
-    Ok(recording)
+fn prepared(request: &Request<'_>) -> Result<Usable, GapError> {
+    usable(request, &DataHealth::of(request.sequence)?)
 }
 
 /// The inference on one drive; with another drive's, in its columns and around its model.
 fn alone(
     request: &Request<'_>,
-    recording: &Recording,
+    usable: &Usable,
     like: Option<&Inferred>,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Inferred, GapError> {
-    let windows = split(recording, false).training;
+    let Usable { recording, windows: split } = usable;
     let tires = match (like, request.given_tires()) {
         (Some(like), _) => like.tires,
         (None, Some(tires)) => tires,
-        (None, None) => fit_tires(recording, request.vehicle, &windows)?,
+        (None, None) => fit_tires(recording, request.vehicle, &split.training)?,
     };
     let trust =
         if like.is_some() || request.given_tires().is_some() { TireTrust::file() } else { TireTrust::free() };
     let mut engine = Engine::new(recording, request.vehicle, tires, trust);
-    let windows = windows.thinned(SEARCH_WINDOWS);
+    let windows = split.training.thinned(SEARCH_WINDOWS);
     let null = fitted_null(&engine, &windows)?;
     let found = if let Some(like) = like {
         linearised(&mut engine, &null, like, &windows)
@@ -160,7 +167,9 @@ fn alone(
         let (library, _) = library(request, recording, trust != TireTrust::free())?;
         let slip_rad = large_slip_rad(&engine, &null, &windows);
         let flexible = Flexible::by_site(recording, slip_rad, request.vehicle.wheelbase_m(), &Site::ALL);
-        infer(&mut engine, &null, &library, flexible, &windows, progress)
+        let other = request.held_out.map(|h| Recording::beside(h, Some(recording))).transpose()?;
+        let scorer = Scorer::new(&engine.clone(), other.as_ref(), split);
+        infer(&mut engine, &null, &library, flexible, &windows, &scorer, progress)
     };
     found.ok_or(GapError::NotFinite)
 }

@@ -280,7 +280,76 @@ impl Joint {
     }
 }
 
+/// A model looked at by plain rollouts, its derivatives those of a linearisation nearby.
+#[derive(Debug, Clone)]
+pub(crate) struct Trial {
+    /// Robust weighted sum of squares, start states at their best.
+    pub(crate) cost: f64,
+    /// Half its derivative by each column.
+    pub(crate) gradient: DVector<f64>,
+    /// How far the best start states are from those given.
+    pub(crate) shifts: Vec<[f64; 2]>,
+}
+
+impl Joint {
+    /// Looks at a model of some of the columns with its `own` values. `scale`: noise of each channel over that of the linearisation; the engine's
+    /// noise is the present one.
+    pub(crate) fn trial(
+        &self,
+        engine: &Engine<'_>,
+        model: &ExtendedModel<'_>,
+        own: &[f64],
+        starts: &[[f64; 2]],
+        windows: &Windows,
+        scale: &[f64],
+    ) -> Option<Trial> {
+        let parts: Vec<(f64, DVector<f64>, [f64; 2])> = self
+            .parts
+            .par_iter()
+            .zip(&windows.windows)
+            .zip(starts)
+            .map(|((part, window), start)| {
+                let (mut measured, mut predicted) = (Vec::new(), Vec::new());
+                model.measured(window, &mut measured);
+                model.rollout(own, *start, window, &mut predicted);
+                let kept = measured.iter().zip(&predicted).filter(|(m, _)| !m.is_nan());
+                let residual = DVector::from_iterator(
+                    part.channel.len(),
+                    kept.zip(&part.channel).map(|((m, p), &c)| (m - p) / engine.sigma[c]),
+                );
+                part.looked_at(residual, scale)
+            })
+            .collect();
+        let mut out = Trial {
+            cost: 0.0,
+            gradient: DVector::zeros(self.columns),
+            shifts: Vec::with_capacity(parts.len()),
+        };
+        for (cost, gradient, shift) in parts {
+            out.cost += cost;
+            out.gradient += gradient;
+            out.shifts.push(shift);
+        }
+        (out.cost.is_finite() && out.gradient.iter().all(|g| g.is_finite())).then_some(out)
+    }
+}
+
 impl Part {
+    /// Cost, half its gradient, and the shift of the start state, for other residuals under the present noise.
+    fn looked_at(&self, residual: DVector<f64>, scale: &[f64]) -> (f64, DVector<f64>, [f64; 2]) {
+        let n = residual.len() as f64;
+        let start =
+            DMatrix::from_fn(self.start.nrows(), 2, |r, c| self.start[(r, c)] / scale[self.channel[r]]);
+        let square = start.tr_mul(&start) + DMatrix::identity(2, 2) * 1e-12;
+        let shift = square
+            .try_inverse()
+            .map_or_else(|| DVector::zeros(2), |inverse| inverse * start.tr_mul(&residual));
+        let left = residual - &start * &shift;
+        let (weight, cost) = robust(left.norm_squared(), n);
+        let weighed = DVector::from_fn(left.len(), |r, _| left[r] / scale[self.channel[r]]);
+        (cost, self.jacobian.tr_mul(&weighed) * -weight, [shift[0], shift[1]])
+    }
+
     fn without_columns(&self) -> Self {
         Self {
             residual: self.residual.clone(),
@@ -307,12 +376,15 @@ impl Part {
     /// The same with the window's robust weight, and its cost.
     fn reduced(&self, scale: &[f64]) -> (DVector<f64>, DMatrix<f64>, f64) {
         let (residual, jacobian, _) = self.projected(scale);
-        let n = residual.len() as f64;
-        let root = (1.0 + residual.norm_squared() / n / (ROBUST_K * ROBUST_K)).sqrt();
-        let weight = (1.0 / root).sqrt();
-        let cost = n * 2.0 * ROBUST_K * ROBUST_K * (root - 1.0);
-        (residual * weight, jacobian * weight, cost)
+        let (weight, cost) = robust(residual.norm_squared(), residual.len() as f64);
+        (residual * weight.sqrt(), jacobian * weight.sqrt(), cost)
     }
+}
+
+/// Weight and cost of a window of `n` residuals with a sum of squares: what is far out counts less and less.
+fn robust(square: f64, n: f64) -> (f64, f64) {
+    let root = (1.0 + square / n / (ROBUST_K * ROBUST_K)).sqrt();
+    (1.0 / root, n * 2.0 * ROBUST_K * ROBUST_K * (root - 1.0))
 }
 
 fn overlap(a: &Range<usize>, b: &Range<usize>) -> bool {

@@ -26,6 +26,7 @@
 //! the model that all blocks share; those shares, and all thresholds (`select::thresholds`, `confidence`), were fixed on development drives
 //! of the reference car.
 
+mod around;
 mod budget;
 mod changes;
 mod confidence;
@@ -38,6 +39,7 @@ mod error;
 mod extended_file;
 mod finding;
 mod graded;
+mod hypotheses;
 mod infer;
 mod joint;
 mod noise;
@@ -55,6 +57,7 @@ mod search;
 mod select;
 mod sizes;
 mod state;
+mod stated;
 #[cfg(test)]
 mod testing;
 mod transfer;

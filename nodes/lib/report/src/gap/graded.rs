@@ -44,7 +44,9 @@ fn site_line(graded: &Graded, site: &SiteAnswer) -> String {
         .map(|m| {
             let of = graded.mechanisms.iter().find(|e| e.name == m.name);
             let size = of.and_then(|e| e.parameters.iter().next()).map_or_else(String::new, sized);
-            format!("{}{size} {}", words(m.name), percent(m.probability))
+            let doubt = of.is_some_and(|e| !e.accepted && e.probability >= WORTH_A_LINE);
+            let doubt = if doubt { ", a candidate" } else { "" };
+            format!("{}{size} {}{doubt}", words(m.name), percent(m.probability))
         })
         .collect();
     if site.other_probability >= WORTH_A_WORD {
@@ -136,6 +138,8 @@ mod tests {
             mechanisms: vec![SizedEffect {
                 name: "steering_delay",
                 probability: 0.61,
+                accepted: true,
+                needed_fraction: 0.5,
                 parameters: BTreeMap::from([("delay_s", delay.clone())]),
                 confused_with: vec!["steering_lag"],
             }],
