@@ -11,7 +11,7 @@ mod table;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use clap::Parser;
 use gripsight_reference_car::CarParameters;
 use rayon::prelude::*;
@@ -71,6 +71,10 @@ fn main() -> Result<()> {
         arguments.tracks.truncate(1);
         arguments.frictions = vec![0.9];
         arguments.seeds = arguments.seeds.min(2);
+    }
+    for name in &arguments.variants {
+        let known = Variant::ALL.map(Variant::name);
+        ensure!(known.contains(&name.as_str()), "no variant is called {name:?}; known: {}", known.join(", "));
     }
     let mut work = Vec::new();
     for car in &arguments.cars {
