@@ -48,7 +48,7 @@ fi
 export ROS_DOMAIN_ID=${ROS_DOMAIN_ID:-42}
 mkdir -p "$out"
 # The reference car's pictures show nothing but road: the region is all of them.
-sed -E "s/^( *method:) .*/\1 $method/; s/^( *window_s:) .*/\1 $window.0/; s/^( *hop_s:) .*/\1 $window.0/" params/suite.yaml > "$out/params.yaml"
+sed -E "s/^( *method:) .*/\1 $method/; s/^( *window_s:) .*/\1 $window.0/; s/^( *hop_s:) .*/\1 $window.0/; s/^( *first_s:) .*/\1 0.0/" params/suite.yaml > "$out/params.yaml"
 printf '\ncamera_prior:\n  ros__parameters:\n    region: [0.0, 0.0, 1.0, 1.0]\n' >> "$out/params.yaml"
 printf '\ns4_residual:\n  ros__parameters:\n    epochs: %d\n' "$epochs" >> "$out/params.yaml"
 

@@ -1,70 +1,66 @@
-//! What is to be said of a sequence's signals.
+//! What is to be said of a recording's signals.
 
-use gripsight_signals::{BadKind, BadSpan, Check, Checks, Finding, Pair, StateSequence, cross_check, masked};
+use gripsight_identification::{EstimatedMotion, Outcome, Recorded, Usable};
+use gripsight_signals::{BadKind, BadSpan, StateSequence, Unchecked};
+use gripsight_vehicle::VehicleParameters;
+use serde::Serialize;
+use serde_json::Value;
 
-/// A sequence, and what its signals say of each other.
-pub(crate) struct Prepared {
-    /// As it was recorded.
-    pub(crate) sequence: StateSequence,
-    /// What the signals say of each other.
-    pub(crate) checks: Checks,
-    /// Bad samples, which identification leaves out.
-    pub(crate) bad: Vec<BadSpan>,
+/// What the signals say of each other, the bad samples and what was estimated, in sentences.
+pub(crate) fn notes(recorded: &Recorded) -> Vec<String> {
+    let mut notes: Vec<String> = recorded.checks.disagreeing().map(ToString::to_string).collect();
+    notes.extend(recorded.estimated.iter().map(ToString::to_string));
+    for kind in [BadKind::Outlier, BadKind::Frozen, BadKind::Jump] {
+        let spans: Vec<&BadSpan> = recorded.bad_samples.iter().filter(|b| b.kind == kind).collect();
+        let Some(first) = spans.first() else { continue };
+        let what = match kind {
+            BadKind::Outlier => "single samples that stand out, left out",
+            BadKind::Frozen => "stretches over which a sensor repeated itself, left out",
+            BadKind::Jump => "jumps of the localisation",
+        };
+        notes.push(format!("{} {what} (first: {} at {:.2} s)", spans.len(), first.channel, first.from_s));
+    }
+    let unchecked: Vec<String> =
+        recorded.checks.unchecked.iter().map(|u| format!("{} of {}", u.property, u.signal)).collect();
+    if !unchecked.is_empty() {
+        notes.push(format!("nothing recorded checks: {}", unchecked.join("; ")));
+    }
+    notes
 }
 
-impl Prepared {
-    /// Compares the signals with each other, and looks for bad samples.
-    pub(crate) fn new(sequence: StateSequence) -> anyhow::Result<Self> {
-        Ok(Self { checks: cross_check(&sequence)?, bad: masked(&sequence)?.bad, sequence })
-    }
+/// `signals` of a result: what nothing checks, bad samples, and what was estimated.
+#[derive(Serialize)]
+pub(crate) struct SignalsOf<'a> {
+    unchecked: &'a [Unchecked],
+    bad_samples: &'a [BadSpan],
+    estimated: Option<&'a EstimatedMotion>,
+}
 
-    /// In sentences.
-    pub(crate) fn notes(&self) -> Vec<String> {
-        let mut notes: Vec<String> = self.checks.disagreeing().map(disagreement).collect();
-        for kind in [BadKind::Outlier, BadKind::Frozen, BadKind::Jump] {
-            let spans: Vec<&BadSpan> = self.bad.iter().filter(|b| b.kind == kind).collect();
-            let Some(first) = spans.first() else { continue };
-            let what = match kind {
-                BadKind::Outlier => "single samples that stand out, left out",
-                BadKind::Frozen => "stretches over which a sensor repeated itself, left out",
-                BadKind::Jump => "jumps of the localisation",
-            };
-            notes.push(format!("{} {what} (first: {} at {:.2} s)", spans.len(), first.channel, first.from_s));
+impl<'a> SignalsOf<'a> {
+    pub(crate) fn new(recorded: &'a Recorded) -> Self {
+        Self {
+            unchecked: &recorded.checks.unchecked,
+            bad_samples: &recorded.bad_samples,
+            estimated: recorded.estimated.as_ref(),
         }
-        let unchecked: Vec<String> =
-            self.checks.unchecked.iter().map(|u| format!("{} of {}", u.property, u.signal)).collect();
-        if !unchecked.is_empty() {
-            notes.push(format!("nothing recorded checks: {}", unchecked.join("; ")));
-        }
-        notes
     }
 }
 
-/// What a check that speaks against a signal means.
-pub(crate) fn disagreement(check: &Check) -> String {
-    let (first, second) = match check.pair {
-        Pair::YawRateAndHeading => ("the yaw rate", "the pose's heading"),
-        Pair::YawRateAndGyro => ("the yaw rate", "the gyroscope"),
-        Pair::SpeedAndPose => ("v_x", "the way from pose to pose"),
-        Pair::LateralSpeedAndPose => ("v_y", "the sideways way from pose to pose"),
-        Pair::LateralAccelerationAndMotion => ("a_y", "v_x times yaw rate and the change of v_y"),
-        Pair::ForwardAccelerationAndMotion => ("a_x", "the change of v_x"),
-        Pair::LateralSpeedAndAcceleration => ("the change of v_y", "what a_y leaves for it"),
-        Pair::MeasuredAndCommandedSteering => ("the measured steering", "the command"),
-    };
-    let figures = format!("{:.3} times {second} ({:.3} to {:.3})", check.ratio, check.low, check.high);
-    match check.finding {
-        Finding::Sign => {
-            format!("{first} has the other sign than {second}: `sign: -1` in a topics file turns it")
-        }
-        Finding::Unit { probably } => {
-            format!("{first} is {figures}: one of them is probably in {probably} (`unit:` in a topics file)")
-        }
-        Finding::NotMeasured { .. } => {
-            format!(
-                "{first} is {figures}: not measured, or of another point; a model or a formula may have made it"
-            )
-        }
-        _ => format!("{first} is {figures}"),
+/// An identification's JSON with `checks[]` and, in `signals`, what [`SignalsOf`] holds.
+pub(crate) fn with_checks(result: &Outcome) -> anyhow::Result<Value> {
+    let mut json = serde_json::to_value(result)?;
+    json["checks"] = serde_json::to_value(&result.recorded.checks.checks)?;
+    if let Value::Object(more) = serde_json::to_value(SignalsOf::new(&result.recorded))? {
+        more.into_iter().for_each(|(name, value)| json["signals"][name] = value);
     }
+    Ok(json)
+}
+
+/// A recording as a diagnosis takes it: bad samples left out, and what nothing measures estimated; what contradicts itself stays, to be named.
+pub(crate) fn for_diagnosis(
+    sequence: &StateSequence,
+    vehicle: &VehicleParameters,
+) -> anyhow::Result<(StateSequence, Recorded)> {
+    let Usable { sequence, recorded } = Usable::measured_or_estimated(sequence, vehicle)?;
+    Ok((sequence, recorded))
 }

@@ -15,11 +15,12 @@ use gripsight_identification::export::{read_tires, stamp_text};
 use gripsight_identification::vehicle_hash;
 use gripsight_model::EffectId;
 use gripsight_report::{GapInput, Header, TopicUse, gap_page, gap_text, graded_text, topic_uses};
-use gripsight_signals::{StateSequence, WindowConfig};
+use gripsight_signals::{Check, StateSequence, WindowConfig};
 use gripsight_vehicle::VehicleParameters;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
+use crate::data::{SignalsOf, for_diagnosis, notes as signal_notes};
 use crate::invocation::{file_name, invocation};
 use crate::notes::read_notes;
 use crate::predictions::{self, Written};
@@ -99,6 +100,10 @@ struct GapFile<'a> {
     topics: Vec<TopicUse<'a>>,
     /// What reading the data met, in sentences.
     data_notes: &'a [String],
+    /// Each signal against each other.
+    checks: &'a [Check],
+    /// What nothing checks, bad samples, and what was estimated.
+    signals: SignalsOf<'a>,
     /// The graded answer, where it was asked for.
     #[serde(flatten)]
     graded: Option<&'a Graded>,
@@ -129,9 +134,15 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     let model = args.extended_model.as_deref().map(extended_model).transpose()?;
     // The drive that is explained is the later one, from the model of the earlier one.
     let subject = args.bag2.as_deref().unwrap_or(&args.bag);
-    let (sequence, report) = read(subject, &topics)?;
-    let first = args.bag2.as_ref().map(|_| read(&args.bag, &topics)).transpose()?;
-    let held_out = args.heldout.as_deref().map(|path| read(path, &topics)).transpose()?;
+    let usable = |path: &Path| -> anyhow::Result<_> {
+        let (sequence, report) = read(path, &topics)?;
+        let (sequence, recorded) = for_diagnosis(&sequence, &vehicle)
+            .with_context(|| format!("cannot diagnose {}", path.display()))?;
+        Ok((sequence, report, recorded))
+    };
+    let (sequence, report, recorded) = usable(subject)?;
+    let first = args.bag2.as_ref().map(|_| usable(&args.bag)).transpose()?;
+    let held_out = args.heldout.as_deref().map(usable).transpose()?;
     let reading_s = start.elapsed().as_secs_f64();
     let spinner =
         ProgressBar::new_spinner().with_style(ProgressStyle::with_template("{spinner} {msg} {elapsed}")?);
@@ -166,10 +177,11 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     let diagnosing_s = start.elapsed().as_secs_f64() - reading_s;
     let header = header(subject, &vehicle, &sequence);
     let compared_with = args.bag2.as_ref().map(|_| file_name(&args.bag));
-    let mut notes = read_notes(&report);
+    let mut notes = [read_notes(&report), signal_notes(&recorded)].concat();
     for (path, beside) in [(Some(&args.bag), &first), (args.heldout.as_ref(), &held_out)] {
-        if let (Some(path), Some((_, report))) = (path, beside) {
-            notes.extend(read_notes(report).iter().map(|note| format!("{}: {note}", file_name(path))));
+        if let (Some(path), Some((_, report, recorded))) = (path, beside) {
+            let all = [read_notes(report), signal_notes(recorded)].concat();
+            notes.extend(all.iter().map(|note| format!("{}: {note}", file_name(path))));
         }
     }
     let page = gap_page(&GapInput {
@@ -183,6 +195,8 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         diagnosis: &result,
         topics: topic_uses(&report.topics),
         data_notes: &notes,
+        checks: &recorded.checks.checks,
+        signals: SignalsOf::new(&recorded),
         graded: graded.as_ref(),
     };
     let timing = Timing { reading_s, diagnosing_s, total_s: start.elapsed().as_secs_f64() };

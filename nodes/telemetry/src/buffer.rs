@@ -41,6 +41,14 @@ impl Buffer {
         })
     }
 
+    /// Gives the first window out from a length on, while it grows; 0: not before it is full.
+    pub(crate) fn growing_from(mut self, first_s: f64) -> Result<Self, SignalError> {
+        if first_s > 0.0 {
+            self.sequencer = self.sequencer.growing_from(first_s)?;
+        }
+        Ok(self)
+    }
+
     /// Takes a message; gives the windows that it closes.
     pub(crate) fn push(&mut self, message: Measurement) -> Vec<StateSequence> {
         let jumps = self.sequencer.taken().clock_jumps;

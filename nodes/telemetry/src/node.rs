@@ -35,6 +35,13 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
             .range(0.1..=3600.0)
             .read_only(),
     )?;
+    let first_s = node.parameter(
+        "first_s",
+        0.0,
+        Descriptor::new("Length from which the first window is given out while it grows, again every half of that [s]; 0: once it is full")
+            .range(0.0..=3600.0)
+            .read_only(),
+    )?;
     let window = WindowConfig { length_s: length_s.get(), hop_s: hop_s.get().min(length_s.get()) };
     let file = node.parameter(
         "topics_file",
@@ -47,7 +54,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
         path => TopicMap::read(Path::new(path))?.live()?,
     };
     live.cannot.iter().for_each(|what| tracing::warn!("{what}"));
-    let buffer = Buffer::new(window, live.layout.clone())?;
+    let buffer = Buffer::new(window, live.layout.clone())?.growing_from(first_s.get())?;
 
     let sensor = node.sensor_qos(50);
     let mut odometry = node.subscription::<Odometry>("odom", sensor)?;

@@ -25,7 +25,7 @@ use gripsight_vehicle::VehicleParameters;
 
 use crate::Outcome;
 use crate::camera::{NetworkArgs, prior_of_bag};
-use crate::data::Prepared;
+use crate::data::{notes as signal_notes, with_checks};
 use crate::diagnose::extended_model;
 use crate::invocation::{file_name, invocation};
 use crate::notes::read_notes;
@@ -212,11 +212,6 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
                 .with_context(|| format!("cannot take the effects out of {}", args.bag().display()))?;
         }
     }
-    let prepared: Vec<Prepared> = sequences
-        .into_iter()
-        .map(Prepared::new)
-        .collect::<anyhow::Result<_>>()
-        .with_context(|| format!("cannot identify the tires from {}", args.bag().display()))?;
     let notes = data_notes(&report, model.as_ref());
     timing.reading_s = start.elapsed().as_secs_f64();
     let prior = args.prior(&topics)?;
@@ -226,8 +221,7 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
     let progress = Progress::new();
     let mut last = None;
     let mut windows = Windows::default();
-    for data in &prepared {
-        let sequence = &data.sequence;
+    for sequence in &sequences {
         let mut stages = progress.run(&config);
         let mut result =
             identify(sequence, &vehicle, prior, previous.as_ref(), &config, &mut |stage| stages.enter(stage))
@@ -235,8 +229,8 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
         together::compare(args, &alone, &vehicle, &mut result)?;
         timing.add(&stages.finish());
         let writing = Instant::now();
-        let notes: Vec<String> = notes.iter().cloned().chain(data.notes()).collect();
-        let files = write(args, &vehicle, &notes, data, &result)?;
+        let notes: Vec<String> = notes.iter().cloned().chain(signal_notes(&result.recorded)).collect();
+        let files = write(args, &vehicle, &notes, sequence, &result)?;
         timing.writing_s += writing.elapsed().as_secs_f64();
         windows.add(sequence, &result, previous.as_ref());
         if result.replaces(previous.as_ref()) {
@@ -246,7 +240,7 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
     }
     timing.total_s = start.elapsed().as_secs_f64();
     let Some((result, mut files)) = last else { bail!("{}: no state sequence", args.bag().display()) };
-    if prepared.len() > 1 {
+    if sequences.len() > 1 {
         files.push(windows.write(&args.out)?);
     }
     let timing_file = args.out.join("timing.json");
@@ -268,10 +262,9 @@ fn write(
     args: &IdentifyArgs,
     vehicle: &VehicleParameters,
     notes: &[String],
-    data: &Prepared,
+    sequence: &StateSequence,
     result: &identification::Outcome,
 ) -> anyhow::Result<Vec<PathBuf>> {
-    let sequence = &data.sequence;
     let provenance = Provenance {
         car: car_name(args, vehicle),
         bag: args.bags.iter().map(|bag| file_name(bag)).collect::<Vec<_>>().join(" + "),
@@ -302,7 +295,7 @@ fn write(
         data_notes: notes,
     })?;
     let texts = [
-        ("identification.json", serde_json::to_string_pretty(&with_checks(result, data)?)? + "\n"),
+        ("identification.json", serde_json::to_string_pretty(&with_checks(result)?)? + "\n"),
         ("report.html", page),
     ];
     let mut files = Vec::new();
@@ -330,15 +323,6 @@ fn write(
         files.extend(provisional.write(&args.out)?);
     }
     Ok(files)
-}
-
-/// The outcome with what the signals say of each other: `checks[]`, `signals.unchecked[]`, and the bad samples left out.
-fn with_checks(result: &identification::Outcome, data: &Prepared) -> anyhow::Result<serde_json::Value> {
-    let mut json = serde_json::to_value(result)?;
-    json["checks"] = serde_json::to_value(&data.checks.checks)?;
-    json["signals"]["unchecked"] = serde_json::to_value(&data.checks.unchecked)?;
-    json["signals"]["bad_samples"] = serde_json::to_value(&data.bad)?;
-    Ok(json)
 }
 
 /// What reading the bag met, in sentences.

@@ -31,6 +31,7 @@ struct Verdict {
 pub(crate) fn judge(run: &Identification, envelope: &Envelope, outcome: &mut Outcome) {
     let mut verdict = Verdict::default();
     changed_grip(run, outcome, &mut verdict);
+    verdict.remarks.extend(run.recorded.estimated.iter().map(ToString::to_string));
     bounds(outcome, &mut verdict);
     prediction(run, outcome, &mut verdict);
     stability(run, envelope, outcome, &mut verdict);

@@ -15,7 +15,7 @@ use crate::rollout::{NAMES, PARAMETERS, SIGNALS, TireRollout, vector_of};
 use crate::tires::on_bound;
 use crate::{
     Change, Config, Estimate, FrictionPrior, HorizonError, Identification, IdentificationError, Nuisance,
-    Outcome, PeakFriction, PerAxle, ProvisionalSet, Range, ResidualKind, Rmse, RmseReport, RunKey,
+    Outcome, PeakFriction, PerAxle, ProvisionalSet, Range, Recorded, ResidualKind, Rmse, RmseReport, RunKey,
     SignalCorrections, SignalEstimates, Source, Status, Trace, ValidWithin, WeakSignal,
 };
 
@@ -36,6 +36,7 @@ pub(crate) struct Request<'a> {
     pub(crate) prior: Option<FrictionPrior>,
     pub(crate) config: &'a Config,
     pub(crate) initial: &'a PacejkaParameters,
+    pub(crate) recorded: &'a Recorded,
 }
 
 /// The outcome of telemetry that was not fitted at all.
@@ -90,6 +91,7 @@ pub(crate) fn refused(
         key: request.key.clone(),
         config: request.config.clone(),
         vehicle: request.vehicle.clone(),
+        recorded: request.recorded.clone(),
         trace: Trace::default(),
     }
 }
@@ -174,6 +176,7 @@ pub(crate) fn conclude(run: &Identification, converged: bool) -> Result<Outcome,
         key,
         config: run.config.clone(),
         vehicle: run.vehicle.clone(),
+        recorded: run.recorded.clone(),
         trace: trace(run, &before, &after),
     };
     crate::acceptance::judge(run, &envelope, &mut outcome);

@@ -1,10 +1,10 @@
 //! Telemetry made ready for fitting: checked, cut into windows, and split into parts for fitting, choosing and judging.
 
 use gripsight_model::{Window, tile};
-use gripsight_signals::{DataHealth, Segment, StateSequence, masked, segments};
+use gripsight_signals::{DataHealth, Segment, segments};
 use gripsight_vehicle::VehicleParameters;
 
-use crate::IdentificationError;
+use crate::{IdentificationError, Usable};
 
 /// What a window is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,32 +49,19 @@ const SLOW_SHARE: f64 = 0.25;
 pub(crate) const SLOW_MPS: f64 = 0.5;
 /// Half the length of the lines that give the derivative of v_x.
 const SLOPE_HALF_S: f64 = 0.1;
-/// A sensor that stands still for more of the time than this is no sensor.
-const MOST_FROZEN: f64 = 0.5;
 /// Fewest windows to fit anything to.
 pub(crate) const MIN_WINDOWS: usize = 12;
 
 impl Data {
     /// # Errors
-    /// Telemetry that is malformed, frozen, too short, or of a car that stands.
+    /// Telemetry that is malformed, too short, or of a car that stands.
     pub(crate) fn new(
-        sequence: &StateSequence,
+        usable: &Usable,
         vehicle: &VehicleParameters,
         health: &DataHealth,
         min_windows: usize,
     ) -> Result<Self, IdentificationError> {
         vehicle.clone().checked()?;
-        for channel in ["v_y_mps", "yaw_rate_radps"] {
-            let frozen: Vec<_> = health.frozen.iter().filter(|span| span.channel == channel).collect();
-            let frozen_s: f64 = frozen.iter().map(|span| span.to_s - span.from_s).sum();
-            if let (Some(first), Some(last)) = (frozen.first(), frozen.last())
-                && frozen_s > MOST_FROZEN * health.duration_s
-            {
-                return Err(IdentificationError::Frozen { channel, from_s: first.from_s, to_s: last.to_s });
-            }
-        }
-        // Bad samples cost themselves; left out, they are a gap as a lost message makes one.
-        let usable = masked(sequence)?;
         let sequence = &usable.sequence;
         let segments = segments(sequence, WINDOW_S)?;
         let dt_s = segments.first().map_or(f64::NAN, |s| s.dt_s);
@@ -102,7 +89,11 @@ impl Data {
             });
         }
         let a_x_mps2 = segments.iter().map(forward_acceleration).collect();
-        let noise = [noise_of(&segments, |s| &s.v_y_mps), noise_of(&segments, |s| &s.yaw_rate_radps)];
+        // An estimated v_y is smoother than it is known.
+        let noise = [
+            noise_of(&segments, |s| &s.v_y_mps).max(usable.v_y_sigma_mps()),
+            noise_of(&segments, |s| &s.yaw_rate_radps),
+        ];
         let mut data = Self {
             health: health.clone(),
             segments,

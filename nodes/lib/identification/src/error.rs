@@ -15,18 +15,6 @@ pub enum IdentificationError {
     /// The residual network refused its settings or weights.
     #[error("residual network: {0}")]
     Network(#[from] gripsight_s4::Error),
-    /// A sensor repeated one value while the car was moving.
-    #[error(
-        "{channel} stood still from {from_s:.2} s to {to_s:.2} s while the car was moving: the sensor is frozen"
-    )]
-    Frozen {
-        /// Which channel, with its unit.
-        channel: &'static str,
-        /// Since the start of the sequence.
-        from_s: f64,
-        /// Since the start of the sequence.
-        to_s: f64,
-    },
     /// There is not enough driving to fit anything to.
     #[error("{what}: {got:.3}, at least {needed:.3} needed; {drive}")]
     TooLittle {

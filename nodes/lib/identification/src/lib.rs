@@ -20,6 +20,7 @@ mod monitor;
 pub mod nelder_mead;
 mod outcome;
 mod picture;
+mod recorded;
 mod residual;
 mod residual_model;
 mod rollout;
@@ -42,6 +43,7 @@ pub use outcome::{
     Change, HorizonError, IterationRecord, Outcome, PeakFriction, ProvisionalSet, Rmse, RmseReport,
     SignalEstimates, Source, Status, TireCurve, Trace, WeakSignal,
 };
+pub use recorded::{EstimatedChannel, EstimatedMotion, Objection, Recorded, Usable, Why};
 pub use residual::train_residual;
 pub use residual_model::{INPUTS, OUTPUTS, ResidualModel};
 pub use rollout::Nuisance;

@@ -13,7 +13,7 @@ use crate::data::Data;
 use crate::judge::rollout_errors;
 use crate::rollout::{TireRollout, vector_of};
 use crate::tires::D_BOUNDS;
-use crate::{AcceptedSet, Estimate, FrictionPrior, IdentificationError, PerAxle, vehicle_hash};
+use crate::{AcceptedSet, Estimate, FrictionPrior, IdentificationError, PerAxle, Usable, vehicle_hash};
 use gripsight_estimation::shooting::{Parameter, Problem, TOLERANCE, fit};
 
 /// Smallest change of D that is worth a notice, as a share of it.
@@ -99,9 +99,10 @@ impl Monitor {
     /// Looks at the last 10 s of telemetry.
     ///
     /// # Errors
-    /// [`IdentificationError`] for telemetry that is malformed, frozen or holds less than 2.4 s of driving.
+    /// [`IdentificationError`] for telemetry that is malformed or holds less than 2.4 s of driving.
     pub fn look(&self, sequence: &StateSequence) -> Result<Reading, IdentificationError> {
-        self.read(&Data::new(sequence, &self.vehicle, &DataHealth::of(sequence)?, WINDOWS)?, sequence)
+        let usable = Usable::of(sequence, &self.vehicle)?;
+        self.read(&Data::new(&usable, &self.vehicle, &DataHealth::of(sequence)?, WINDOWS)?, sequence)
     }
 
     /// The same with the telemetry made ready.

@@ -5,7 +5,7 @@ use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    AcceptedSet, Config, Estimate, FrictionPrior, Nuisance, PerAxle, Range, Reading, RunKey,
+    AcceptedSet, Config, Estimate, FrictionPrior, Nuisance, PerAxle, Range, Reading, Recorded, RunKey,
     SignalCorrections, ValidWithin,
 };
 
@@ -313,6 +313,9 @@ pub struct Outcome {
     pub config: Config,
     /// The car.
     pub vehicle: VehicleParameters,
+    /// What the signals say of each other, and what became of them.
+    #[serde(skip)]
+    pub recorded: Recorded,
     /// Time series for the report.
     #[serde(skip)]
     pub trace: Trace,

@@ -22,7 +22,7 @@ use crate::data::{Data, MIN_WINDOWS, Part, quantile};
 use crate::rollout::{delayed, substep_s};
 use crate::{
     Candidate, Config, IdentificationError, Method, PerAxle, Range, ResidualKind, ResidualModel, RunKey,
-    SignalCorrections, vehicle_hash,
+    SignalCorrections, Usable, vehicle_hash,
 };
 
 /// Length of the windows of the robust residual: longer than the lateral motion's time constant, shorter than a change of the driving.
@@ -58,8 +58,19 @@ pub fn train_residual(
     config: &Config,
     progress: &mut dyn FnMut(gripsight_s4::Progress) -> ControlFlow<()>,
 ) -> Result<ResidualModel, IdentificationError> {
+    train_on(&Usable::of(sequence, vehicle)?, vehicle, candidate, config, progress)
+}
+
+/// The same with the recording made ready.
+pub(crate) fn train_on(
+    usable: &Usable,
+    vehicle: &VehicleParameters,
+    candidate: &Candidate,
+    config: &Config,
+    progress: &mut dyn FnMut(gripsight_s4::Progress) -> ControlFlow<()>,
+) -> Result<ResidualModel, IdentificationError> {
     let own = RunKey {
-        sequence_id: sequence.sequence_id,
+        sequence_id: usable.sequence.sequence_id,
         vehicle_hash: vehicle_hash(vehicle),
         ..candidate.key.clone()
     };
@@ -72,7 +83,7 @@ pub fn train_residual(
     if !candidate.phi_p.is_finite() {
         return Err(IdentificationError::NotFinite { what: "tires of the candidate" });
     }
-    let data = Data::new(sequence, vehicle, &DataHealth::of(sequence)?, MIN_WINDOWS)?;
+    let data = Data::new(usable, vehicle, &DataHealth::of(&usable.sequence)?, MIN_WINDOWS)?;
     let car = SingleTrack::new(vehicle, &candidate.phi_p);
     let (stretches, dt_s, horizon) = match config.method {
         Method::Paper => (one_step(&data, &car, candidate), data.dt_s, 1),

@@ -4,7 +4,7 @@
 //! start ──> candidate 0 ──> train_residual ──> sweep ──> advance ──> candidate 1 ──> ... ──> advance ──> outcome
 //! ```
 //!
-//! Live, `train_residual` runs in another node; [`identify`] does both in a loop. Every step is a pure function of its arguments.
+//! Live, [`crate::train_residual`] runs in another node; [`identify`] does both in a loop. Every step is a pure function of its arguments.
 
 use std::ops::ControlFlow;
 
@@ -16,14 +16,14 @@ use crate::data::{Data, MIN_WINDOWS, Part};
 use crate::direct::{Direct, direct};
 use crate::extract::extract;
 use crate::judge::rollout_errors;
-use crate::residual::left_over;
+use crate::residual::{left_over, train_on};
 use crate::rollout::{TireRollout, vector_of};
 use crate::start::{check, initial_tires, no_softer};
 use crate::sweep::{Point, Sweep, sweep};
 use crate::tires::curve_change;
 use crate::{
     AcceptedSet, Candidate, Config, FrictionPrior, IdentificationError, IterationRecord, Method, Monitor,
-    Outcome, PerAxle, Reading, ResidualModel, RunKey, train_residual,
+    Outcome, PerAxle, Reading, Recorded, ResidualModel, RunKey, Usable,
 };
 
 /// What a run wants next.
@@ -98,6 +98,8 @@ pub struct Identification {
     /// Turns taken.
     pub(crate) history: Vec<IterationRecord>,
     pub(crate) candidate: Candidate,
+    /// What the signals say of each other.
+    pub(crate) recorded: Recorded,
     /// What the initial tires leave over, see [`left_over`].
     initial_left: [f64; 2],
     ended: bool,
@@ -112,8 +114,20 @@ impl Identification {
     /// is what the last seconds say of it with the shape of the previous curves (not with the paper's method).
     ///
     /// # Errors
-    /// [`IdentificationError`] for telemetry that is malformed or frozen, settings out of range, or a previous set of another car.
+    /// [`IdentificationError`] for telemetry that is malformed, settings out of range, or a previous set of another car.
     pub fn start(
+        sequence: &StateSequence,
+        vehicle: &VehicleParameters,
+        prior: Option<FrictionPrior>,
+        previous: Option<&AcceptedSet>,
+        config: &Config,
+    ) -> Result<Started, IdentificationError> {
+        Self::start_on(&Usable::of(sequence, vehicle)?, sequence, vehicle, prior, previous, config)
+    }
+
+    /// The same with the recording made ready.
+    fn start_on(
+        usable: &Usable,
         sequence: &StateSequence,
         vehicle: &VehicleParameters,
         prior: Option<FrictionPrior>,
@@ -124,16 +138,23 @@ impl Identification {
         let key = RunKey::first(sequence, vehicle, config);
         let mut initial = initial_tires(prior, previous, config.method, &config.initial);
         let health = DataHealth::of(sequence)?;
-        let refuse = |reason: String, drive: &str| {
-            let request = Request { key: &key, vehicle, prior, config, initial: &initial };
-            Started::Refused(Box::new(refused(&request, &health, vec![reason], vec![drive.to_owned()])))
+        let refuse = |reasons: Vec<String>, drive: Option<&str>| {
+            let request =
+                Request { key: &key, vehicle, prior, config, initial: &initial, recorded: &usable.recorded };
+            let drive_next = drive.map(str::to_owned).into_iter().collect();
+            Started::Refused(Box::new(refused(&request, &health, reasons, drive_next)))
         };
-        if let Some(reason) = Excitation::of(sequence)?.insufficient {
-            return Ok(refuse(reason, "drive corners both ways, at growing speed, for half a minute"));
+        let objections = &usable.recorded.objections;
+        if !objections.is_empty() {
+            return Ok(refuse(objections.iter().map(ToString::to_string).collect(), None));
         }
-        let mut data = match Data::new(sequence, vehicle, &health, MIN_WINDOWS) {
+        if let Some(reason) = Excitation::of(&usable.sequence)?.insufficient {
+            let drive = "drive corners both ways, at growing speed, for half a minute";
+            return Ok(refuse(vec![reason], Some(drive)));
+        }
+        let mut data = match Data::new(usable, vehicle, &health, MIN_WINDOWS) {
             Err(error @ IdentificationError::TooLittle { drive, .. }) => {
-                return Ok(refuse(error.to_string(), drive));
+                return Ok(refuse(vec![error.to_string()], Some(drive)));
             }
             other => other?,
         };
@@ -170,6 +191,7 @@ impl Identification {
             direct_error: f64::INFINITY,
             history: Vec::new(),
             candidate,
+            recorded: usable.recorded.clone(),
             initial_left: [1.0; 2],
             ended: false,
         };
@@ -322,7 +344,8 @@ pub fn identify(
     progress: &mut dyn FnMut(Stage),
 ) -> Result<Outcome, IdentificationError> {
     progress(Stage::Preparing);
-    let mut run = match Identification::start(sequence, vehicle, prior, previous, config)? {
+    let usable = Usable::of(sequence, vehicle)?;
+    let mut run = match Identification::start_on(&usable, sequence, vehicle, prior, previous, config)? {
         Started::Running(run) => run,
         Started::Refused(outcome) => return Ok(*outcome),
     };
@@ -330,7 +353,7 @@ pub fn identify(
     loop {
         let iteration = run.candidate.key.iteration + 1;
         progress(Stage::Training { iteration, epoch: 0, epochs_max, loss: f64::NAN });
-        let model = train_residual(sequence, vehicle, &run.candidate, config, &mut |p| {
+        let model = train_on(&usable, vehicle, &run.candidate, config, &mut |p| {
             progress(Stage::Training { iteration, epoch: p.epoch, epochs_max, loss: p.validation_loss });
             ControlFlow::Continue(())
         })?;

@@ -100,6 +100,29 @@ fn frozen(sequence: &StateSequence) -> Vec<FrozenSpan> {
     spans
 }
 
+/// Whether a channel says nothing of a motion: in most of the half of the samples with the most steering it repeats one value for over half a second.
+/// A sensor's dead band, or a simulator's constant speed, does so on the straights alone.
+#[must_use]
+pub fn stands_still(sequence: &StateSequence, values: &[f32]) -> bool {
+    const MOST: f64 = 0.5;
+    if values.len() != sequence.len() || values.is_empty() {
+        return true;
+    }
+    let mut sorted = sequence.steering_rad.clone();
+    let middle = sorted.len() / 2;
+    let straight = *sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let mut sizes: Vec<f32> = sequence.steering_rad.iter().map(|d| (d - straight).abs()).collect();
+    let usual = *sizes.clone().select_nth_unstable_by(middle, f32::total_cmp).1;
+    sizes.iter_mut().for_each(|size| *size -= usual);
+    let wide: Vec<f64> = values.iter().map(|&v| f64::from(v)).collect();
+    let time_s: Vec<f64> = sequence.time_s.iter().map(|&t| f64::from(t)).collect();
+    let mut still = vec![false; values.len()];
+    still_spans(&time_s, &wide, |_| true).into_iter().for_each(|(from, to)| still[from..=to].fill(true));
+    let turning: Vec<bool> =
+        sizes.iter().zip(&still).filter(|(size, _)| **size >= 0.0).map(|(_, &still)| still).collect();
+    turning.iter().filter(|still| **still).count() as f64 > MOST * turning.len() as f64
+}
+
 /// First and last sample of every stretch over which a channel repeats itself for over half a second while `moving`.
 pub(crate) fn still_spans(
     time_s: &[f64],
@@ -147,5 +170,22 @@ mod tests {
         assert_eq!(health.frozen[0].channel, "v_y_mps");
         approx::assert_abs_diff_eq!(health.frozen[0].from_s, 1.0, epsilon = 1e-3);
         assert_eq!(health.moving_share, 1.0);
+    }
+
+    #[test]
+    fn what_repeats_itself_in_corners_stands_still_and_a_dead_band_does_not() {
+        let time_s: Vec<f32> = (0..2000).map(|k| k as f32 * 0.01).collect();
+        let steering: Vec<f32> = time_s.iter().map(|t| 0.2 * (0.8 * t).sin()).collect();
+        let sequence = StateSequence {
+            v_x_mps: vec![5.0; 2000],
+            yaw_rate_radps: steering.iter().map(|d| if d.abs() < 0.1 { 0.0 } else { 10.0 * d }).collect(),
+            v_y_mps: vec![0.3; 2000],
+            steering_rad: steering,
+            time_s,
+            ..Default::default()
+        };
+        assert!(stands_still(&sequence, &sequence.v_y_mps));
+        assert!(!stands_still(&sequence, &sequence.yaw_rate_radps));
+        assert!(stands_still(&sequence, &[]));
     }
 }

@@ -16,6 +16,7 @@ mod health;
 mod layout;
 mod mask;
 mod measurement;
+mod pose;
 mod segment;
 mod sequence;
 mod sequencer;
@@ -25,16 +26,17 @@ mod window;
 
 pub use align::{AlignConfig, Aligner, Pushed};
 pub use channels::{CHANNELS, Channel, Clock, Kind};
-pub use checks::{Check, Checks, Finding, Pair, Unchecked, cross_check};
+pub use checks::{Check, Checks, Finding, Pair, Unchecked, cross_check, steering_check};
 pub use error::SignalError;
 pub use excitation::Excitation;
-pub use health::{DataHealth, FrozenSpan, Gap};
+pub use health::{DataHealth, FrozenSpan, Gap, stands_still};
 pub use layout::Layout;
 pub use mask::{BadKind, BadSpan, Masked, masked};
 pub use measurement::{
     DriveSample, ImuSample, MappedSample, Measurement, OdometrySample, PoseSample, TelemetrySample,
     WheelsSample,
 };
+pub use pose::{is_dead_reckoning, is_integral_of_twist, pose_delay_s, yaw_rates};
 pub use segment::{Segment, segments};
 pub use sequence::{Commands, Poses, StateSequence};
 pub use sequencer::{Sequencer, Taken, stamp_s};

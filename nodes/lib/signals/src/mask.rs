@@ -52,7 +52,7 @@ pub struct Masked {
 
 /// A step of this many usual steps is a jump.
 const JUMP_STEPS: f64 = 8.0;
-/// Where more than this share of the samples would go, they are not single bad ones: nothing is left out.
+/// Where more than this share of the samples stand out, they are not single bad ones: none is left out.
 const MOST_SHARE: f64 = 0.2;
 
 /// Leaves bad samples out. A sequence without any comes back as it is.
@@ -64,11 +64,12 @@ pub fn masked(sequence: &StateSequence) -> Result<Masked, SignalError> {
     let mut out = Masked { sequence: sequence.clone(), bad: Vec::new() };
     let time_s: Vec<f64> = sequence.time_s.iter().map(|&t| f64::from(t)).collect();
     let mut keep = vec![true; sequence.len()];
-    for (name, values) in [
+    let moving = [
         ("v_x_mps", &sequence.v_x_mps),
         ("v_y_mps", &sequence.v_y_mps),
         ("yaw_rate_radps", &sequence.yaw_rate_radps),
-    ] {
+    ];
+    for (name, values) in moving {
         let values: Vec<f64> = values.iter().map(|&v| f64::from(v)).collect();
         for (k, size) in spikes_at(&values) {
             keep[k] = false;
@@ -80,6 +81,14 @@ pub fn masked(sequence: &StateSequence) -> Result<Masked, SignalError> {
                 size,
             });
         }
+    }
+    let left_out = keep.iter().filter(|k| !**k).count();
+    if left_out as f64 > MOST_SHARE * sequence.len() as f64 {
+        keep.fill(true);
+        out.bad.clear();
+    }
+    for (name, values) in moving {
+        let values: Vec<f64> = values.iter().map(|&v| f64::from(v)).collect();
         let usual = usual_step(&values);
         for (from, to) in still_spans(&time_s, &values, |k| sequence.v_x_mps[k].abs() > MOVING_MPS) {
             let after = values.get(to + 1).map_or(0.0, |v| (v - values[to]).abs());
@@ -94,11 +103,6 @@ pub fn masked(sequence: &StateSequence) -> Result<Masked, SignalError> {
                 });
             }
         }
-    }
-    let left_out = keep.iter().filter(|k| !**k).count();
-    if left_out as f64 > MOST_SHARE * sequence.len() as f64 {
-        keep.fill(true);
-        out.bad.clear();
     }
     bridge(&mut out, &time_s);
     jumps(sequence, &mut out.bad);

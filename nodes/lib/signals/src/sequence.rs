@@ -12,7 +12,7 @@ macro_rules! sequence {
         /// same Phi_p bit for bit. Times and positions are relative to the first sample, so that float32 is enough.
         #[derive(Debug, Clone, PartialEq, Default)]
         pub struct StateSequence {
-            /// Names the sequence: the first stamp in nanoseconds.
+            /// Names the sequence: the first stamp in nanoseconds; while its window grows, so many of it as were given out, too.
             pub sequence_id: u64,
             /// Stamp of the first sample.
             pub start_stamp_ns: i64,
@@ -232,6 +232,13 @@ impl StateSequence {
             y_m: pick(&self.pose_y_m, &self.y_m),
             yaw_rad: pick(&self.pose_yaw_rad, &self.yaw_rad),
         }
+    }
+
+    /// Whether it is the beginning of a window that is not full yet.
+    #[must_use]
+    pub fn grows(&self) -> bool {
+        const MOST: u64 = 1000;
+        (1..=MOST).contains(&self.sequence_id.wrapping_sub(self.start_stamp_ns as u64))
     }
 
     /// Whether something measures v_y: it is not zero throughout.

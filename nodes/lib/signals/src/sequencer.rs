@@ -41,6 +41,14 @@ impl Sequencer {
         Ok(Self { window, aligner, cutter: WindowCutter::new(window)?, taken: Taken::default() })
     }
 
+    /// Gives the first window out from a length on, while it grows: see [`WindowCutter::growing_from`].
+    ///
+    /// # Errors
+    /// As [`WindowCutter::growing_from`].
+    pub fn growing_from(self, first_s: f64) -> Result<Self, SignalError> {
+        Ok(Self { cutter: self.cutter.growing_from(first_s)?, ..self })
+    }
+
     /// Takes a message; gives the windows that it closes, and what is wrong with it where it was left out.
     pub fn push(&mut self, message: Measurement) -> (Vec<StateSequence>, Option<SignalError>) {
         let mut closed = Vec::new();

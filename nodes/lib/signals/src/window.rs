@@ -25,12 +25,34 @@ impl Default for WindowConfig {
 ///
 /// A window runs from its first sample up to, not including, the first sample at least `length_s` later; the next one starts
 /// at the first sample at least `hop_s` after the start of this one.
+///
+/// [`Self::growing_from`] gives the first window out early, too: when it is so long, and again every half of that until it is full. Such a
+/// sequence has a number of its own, see [`StateSequence::grows`].
 #[derive(Debug, Clone)]
 pub struct WindowCutter {
     config: WindowConfig,
+    growth: Option<Growth>,
     buffer: Vec<TelemetrySample>,
     commands: VecDeque<DriveSample>,
     poses: VecDeque<PoseSample>,
+}
+
+/// How the first window grows.
+#[derive(Debug, Clone, Copy)]
+struct Growth {
+    first_s: f64,
+    /// Early windows given out; `None` after the first full one.
+    given: Option<u32>,
+}
+
+impl Growth {
+    /// Whether an early window is due at a length, where a full one has `length_s`.
+    fn is_due(&self, elapsed_s: f64, length_s: f64) -> bool {
+        let step_s = 0.5 * self.first_s;
+        let due_s = self.given.map(|given| self.first_s + f64::from(given) * step_s);
+        // One that is nearly full is not worth a run of its own.
+        due_s.is_some_and(|due_s| elapsed_s >= due_s && due_s <= length_s - 0.5 * step_s)
+    }
 }
 
 impl WindowCutter {
@@ -47,14 +69,29 @@ impl WindowCutter {
                 got: config.hop_s,
             });
         }
-        Ok(Self { config, buffer: Vec::new(), commands: VecDeque::new(), poses: VecDeque::new() })
+        let (buffer, commands, poses) = (Vec::new(), VecDeque::new(), VecDeque::new());
+        Ok(Self { config, growth: None, buffer, commands, poses })
+    }
+
+    /// Gives the first window out from a length on, while it grows.
+    ///
+    /// # Errors
+    /// [`SignalError::Config`] where the length is not positive.
+    pub fn growing_from(mut self, first_s: f64) -> Result<Self, SignalError> {
+        if first_s.is_nan() || first_s <= 0.0 {
+            return Err(SignalError::Config { name: "first_s", must: "positive", got: first_s });
+        }
+        self.growth = Some(Growth { first_s, given: Some(0) });
+        Ok(self)
     }
 
     /// Takes a sample; gives the window that it closes.
     pub fn push(&mut self, sample: TelemetrySample) -> Option<StateSequence> {
-        let full = self.buffer.first().is_some_and(|first| elapsed_s(first, &sample) >= self.config.length_s);
-        let closed = if full { self.rest().ok() } else { None };
+        let elapsed_s = self.buffer.first().map_or(0.0, |first| elapsed_s(first, &sample));
+        let full = elapsed_s >= self.config.length_s;
+        let closed = if full { self.rest().ok() } else { self.early(elapsed_s) };
         if full {
+            self.growth.iter_mut().for_each(|growth| growth.given = None);
             let start = self.buffer[0];
             self.buffer.retain(|s| elapsed_s(&start, s) >= self.config.hop_s);
         }
@@ -63,6 +100,16 @@ impl WindowCutter {
         drop_before(&mut self.commands, |c| c.stamp_ns < from_ns);
         drop_before(&mut self.poses, |p| p.stamp_ns < from_ns);
         closed
+    }
+
+    /// The first window while it grows, where one is due.
+    fn early(&mut self, elapsed_s: f64) -> Option<StateSequence> {
+        let growth = self.growth.as_mut().filter(|g| g.is_due(elapsed_s, self.config.length_s))?;
+        let given = growth.given.unwrap_or(0) + 1;
+        growth.given = Some(given);
+        let mut sequence = self.rest().ok()?;
+        sequence.sequence_id += u64::from(given);
+        Some(sequence)
     }
 
     /// Takes a command as it was received; before the samples that it holds for. Without any, the commands are those that the samples have.
@@ -99,6 +146,7 @@ impl WindowCutter {
         self.buffer.clear();
         self.commands.clear();
         self.poses.clear();
+        self.growth.iter_mut().for_each(|growth| growth.given = Some(0));
     }
 }
 
@@ -131,6 +179,24 @@ mod tests {
         let starts: Vec<_> = windows.iter().map(|w| w.start_stamp_ns / 1_000_000).collect();
         assert_eq!(starts, [0, 400, 800, 1200, 1600]);
         assert!(windows.iter().all(|w| w.len() == 100));
+    }
+
+    #[test]
+    fn the_first_window_grows_and_each_has_its_number() {
+        let window = WindowConfig { length_s: 30.0, hop_s: 10.0 };
+        let mut cutter = WindowCutter::new(window).unwrap().growing_from(8.0).unwrap();
+        let mut feed =
+            |from: i64| (from..from + 4200).filter_map(|k| cutter.push(sample(10 * k))).collect::<Vec<_>>();
+        let windows = feed(0);
+        let lengths: Vec<_> = windows.iter().map(StateSequence::len).collect();
+        assert_eq!(lengths, [800, 1200, 1600, 2000, 2400, 2800, 3000, 3000]);
+        let numbers: Vec<_> = windows.iter().map(|w| w.sequence_id).collect();
+        assert_eq!(numbers, [1, 2, 3, 4, 5, 6, 0, 10_000_000_000]);
+        assert_eq!(windows.iter().filter(|w| w.grows()).count(), 6);
+        cutter.clear();
+        assert_eq!(cutter.push(sample(90_000)).map(|w| w.len()), None);
+        assert_eq!((0..801).filter_map(|k| cutter.push(sample(90_010 + 10 * k))).count(), 1);
+        assert!(WindowCutter::new(window).unwrap().growing_from(0.0).is_err());
     }
 
     #[test]

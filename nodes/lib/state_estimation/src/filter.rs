@@ -6,8 +6,8 @@ use serde::Serialize;
 use crate::events::Observation;
 use crate::levels::Levels;
 use crate::state::{
-    A_X, A_Y, ALPHA, ARM, B_R, B_X, B_Y, Drive, LATE, Matrix, N, PSI, R, SCALE, V_X, V_Y, Vector, X, Y,
-    jacobian, rate, step,
+    A_X, A_Y, ALPHA, ARM, B_R, B_X, B_Y, Drive, LATE, Matrix, N, PSI, R, RATE, SCALE, TILT, V_X, V_Y, Vector,
+    X, Y, jacobian, rate, step,
 };
 
 /// v_x, v_y and yaw rate with their covariance.
@@ -80,6 +80,10 @@ impl Filter {
             (B_R, 0.05),
             (ARM, levels.arm_m),
             (SCALE, 0.1),
+            // A body that rolls by 3 degrees a g.
+            (TILT, 0.05),
+            // A gyroscope by its data sheet is better; an odometry's, counted from the steering, is not.
+            (RATE, 0.1),
             (LATE, levels.late_s),
         ] {
             spread[place] = f64::powi(sigma, 2);
@@ -139,9 +143,10 @@ impl Filter {
                 self.one(v_mps - s[V_Y], &h, l.v_y_mps);
             }
             Observation::YawRate(r_radps) => {
-                h[R] = 1.0;
+                h[R] = 1.0 + s[RATE];
                 h[B_R] = 1.0;
-                self.one(r_radps - s[R] - s[B_R], &h, l.yaw_rate_radps);
+                h[RATE] = s[R];
+                self.one(r_radps - (1.0 + s[RATE]) * s[R] - s[B_R], &h, l.yaw_rate_radps);
             }
             Observation::Acceleration { a_x_mps2, a_y_mps2 } => {
                 h[A_X] = 1.0;
@@ -153,12 +158,14 @@ impl Filter {
                 self.one(a_x_mps2 - (s[A_X] + s[B_X] - s[ARM] * s[R] * s[R]), &h, l.a_x_mps2.hypot(product));
                 let s = self.s;
                 let mut h = Vector::zeros();
-                h[A_Y] = 1.0;
+                let (force, scale) = (s[A_Y] + s[ARM] * s[ALPHA], 1.0 + s[TILT]);
+                h[A_Y] = scale;
                 h[B_Y] = 1.0;
-                h[ALPHA] = s[ARM];
-                h[ARM] = s[ALPHA];
-                let product = self.product(ARM, ALPHA);
-                self.one(a_y_mps2 - (s[A_Y] + s[B_Y] + s[ARM] * s[ALPHA]), &h, l.a_y_mps2.hypot(product));
+                h[ALPHA] = scale * s[ARM];
+                h[ARM] = scale * s[ALPHA];
+                h[TILT] = force;
+                let product = self.product(ARM, ALPHA).hypot(self.product(TILT, A_Y));
+                self.one(a_y_mps2 - (scale * force + s[B_Y]), &h, l.a_y_mps2.hypot(product));
             }
         }
     }

@@ -1,8 +1,7 @@
 //! How noisy each sensor is and how fast the motion changes, from the recording itself.
 
-use gripsight_signals::{Poses, StateSequence};
+use gripsight_signals::{Poses, StateSequence, yaw_rates};
 
-use crate::events::yaw_rates;
 use crate::state::Drive;
 
 /// Standard deviations of white noise, and strengths of what drives the motion.

@@ -9,7 +9,7 @@
 //! ```
 //!
 //! with constants beside: biases of the accelerometers and of the gyroscope, the place of the inertial unit ahead of the point of the poses,
-//! and the scale of the speed. [`smooth`] runs an extended Kalman filter forward and a Rauch-Tung-Striebel smoother back (offline); [`Filter`] is
+//! and the scales of speed, yaw rate and lateral acceleration (a body that rolls adds to it). [`smooth`] runs an extended Kalman filter forward and a Rauch-Tung-Striebel smoother back (offline); [`Filter`] is
 //! the forward half alone (live). How strong the white noises are, and how noisy each sensor is, is taken from the recording itself
 //! ([`Levels`]). A pose that contradicts what is known by more than chance does is left out; where poses go on contradicting, the
 //! localisation has jumped, and position and heading begin anew. The delay of the poses is that at which their heading follows the integrated
@@ -17,7 +17,6 @@
 //!
 //! Source of the smoother: Rauch, Tung, Striebel, AIAA Journal 3 (1965), 1445-1450.
 
-mod delay;
 mod error;
 mod events;
 mod filter;
@@ -25,9 +24,8 @@ mod levels;
 mod smoother;
 mod state;
 
-pub use delay::pose_delay_s;
 pub use error::StateError;
-pub use events::{Observation, is_dead_reckoning};
+pub use events::Observation;
 pub use filter::{Filter, Motion};
 pub use levels::Levels;
 pub use smoother::{Smoothed, filled, smooth};

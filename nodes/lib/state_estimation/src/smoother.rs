@@ -1,14 +1,13 @@
 //! Forward by the filter, back by the smoother.
 
-use gripsight_signals::StateSequence;
+use gripsight_signals::{StateSequence, is_dead_reckoning, pose_delay_s};
 use serde::Serialize;
 
-use crate::delay::pose_delay_s;
 use crate::error::StateError;
-use crate::events::{events, is_dead_reckoning};
+use crate::events::events;
 use crate::filter::{Filter, Motion};
 use crate::levels::Levels;
-use crate::state::{ARM, B_R, B_X, B_Y, LATE, Matrix, PSI, SCALE, V_X, Vector, X, Y};
+use crate::state::{ARM, B_R, B_X, B_Y, LATE, Matrix, PSI, RATE, SCALE, TILT, V_X, Vector, X, Y};
 
 /// What the recording says of the motion at every sample.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -31,6 +30,10 @@ pub struct Smoothed {
     pub imu_arm_m: (f64, f64),
     /// Scale of the reported speed: reported over true, less one.
     pub v_x_scale: (f64, f64),
+    /// Scale of the yaw rate: reported over true, less one.
+    pub yaw_rate_scale: (f64, f64),
+    /// Scale of the lateral acceleration: reported over true, less one. A body that rolls adds to it.
+    pub a_y_scale: (f64, f64),
 }
 
 /// Steps between which the way back needs all that is known.
@@ -115,6 +118,8 @@ pub fn smooth(sequence: &StateSequence) -> Result<Smoothed, StateError> {
         acceleration_bias_mps2: [of(B_X), of(B_Y)],
         imu_arm_m: of(ARM),
         v_x_scale: of(SCALE),
+        yaw_rate_scale: of(RATE),
+        a_y_scale: of(TILT),
     })
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::{SMatrix, SVector};
 
 /// Size of the state.
-pub(crate) const N: usize = 15;
+pub(crate) const N: usize = 17;
 pub(crate) type Vector = SVector<f64, N>;
 pub(crate) type Matrix = SMatrix<f64, N, N>;
 
@@ -26,6 +26,10 @@ pub(crate) const ARM: usize = 12;
 pub(crate) const SCALE: usize = 13;
 /// How much later poses are than their delay was taken to be, s.
 pub(crate) const LATE: usize = 14;
+/// Scale of the lateral acceleration: reported over true, less one.
+pub(crate) const TILT: usize = 15;
+/// Scale of the yaw rate: reported over true, less one.
+pub(crate) const RATE: usize = 16;
 
 /// Strengths of the white noises that drive a_x, a_y (m2/s5) and alpha (rad2/s5).
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,8 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
-use gripsight_signals::StateSequence;
-use gripsight_state_estimation::{Smoothed, StateError, filled, is_dead_reckoning, smooth};
+use gripsight_signals::{StateSequence, is_dead_reckoning};
+use gripsight_state_estimation::{Smoothed, StateError, filled, smooth};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Normal};

@@ -44,7 +44,8 @@ impl TopicMap {
         let mut signals: BTreeMap<Signal, Mapping> = self.signals.clone();
         if let Some(topic) = self.pose.as_deref().filter(|topic| !topic.is_empty()) {
             for &(signal, field) in known::fields_of(Odometry::TYPE, known::Group::Pose) {
-                let mapping = Mapping { field: field.to_owned(), ..Mapping::of_topic(topic) };
+                let ahead_m = self.pose_ahead_m;
+                let mapping = Mapping { field: field.to_owned(), ahead_m, ..Mapping::of_topic(topic) };
                 signals.entry(signal).or_insert(mapping);
             }
         }

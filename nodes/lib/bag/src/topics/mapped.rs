@@ -32,6 +32,8 @@ pub struct MappedTopic {
     /// Factor and offset of each signal.
     scales: Vec<(f64, f64)>,
     stamped: bool,
+    /// How far ahead of the centre of gravity the point of the pose lies.
+    ahead_m: f64,
 }
 
 impl MappedTopic {
@@ -48,6 +50,12 @@ impl MappedTopic {
             // What is no number in the message must not pass for a signal that it does not carry.
             let number = if number.is_nan() { f64::INFINITY } else { number };
             values.set(signal, factor * (number - offset));
+        }
+        if self.ahead_m != 0.0 {
+            let [x_m, y_m, heading_rad] = Signal::POSE.map(|signal| values.get(signal));
+            let (sin, cos) = heading_rad.sin_cos();
+            values.set(Signal::X, x_m - self.ahead_m * cos);
+            values.set(Signal::Y, y_m - self.ahead_m * sin);
         }
         let stamp_ns = match numbers[self.signals.len()..] {
             // A header that nobody has stamped holds zero.
@@ -163,6 +171,10 @@ fn mapped(
         scales.push(mapping.scale(signal).map_err(|why| refuse(bag, signal, why))?);
         fields.push((signal, field.to_owned()));
     }
+    let ahead_m = signals.iter().map(|(_, mapping)| mapping.ahead_m).find(|a| *a != 0.0).unwrap_or(0.0);
+    if ahead_m != 0.0 && !Signal::POSE.iter().all(|pose| fields.iter().any(|(signal, _)| signal == pose)) {
+        return Err(refuse(bag, first, "ahead_m needs x, y and heading in one message".to_owned()));
+    }
     let stamped = match stamp {
         Stamp::Log => false,
         Stamp::Field(field) => {
@@ -176,5 +188,14 @@ fn mapped(
         .and_then(|schema| Reader::new(schema, paths))
         .map_err(|e| refuse(bag, first, e.to_string()))?;
     let type_name = topic.type_name.clone();
-    Ok(MappedTopic { topic: name.to_owned(), type_name, signals: fields, place, reader, scales, stamped })
+    Ok(MappedTopic {
+        topic: name.to_owned(),
+        type_name,
+        signals: fields,
+        place,
+        reader,
+        scales,
+        stamped,
+        ahead_m,
+    })
 }

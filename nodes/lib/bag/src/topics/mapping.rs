@@ -37,6 +37,9 @@ pub struct Mapping {
     /// Whether a bag may lack the topic; the signal is then left out.
     #[serde(default)]
     pub optional: bool,
+    /// Of a pose: how far ahead of the centre of gravity its point lies, m (the rear axle: negative). The pose is then moved there.
+    #[serde(default)]
+    pub ahead_m: f64,
 }
 
 fn one() -> f64 {
@@ -69,6 +72,7 @@ impl Mapping {
             unit: None,
             stamp: None,
             optional: false,
+            ahead_m: 0.0,
         }
     }
 
@@ -79,6 +83,9 @@ impl Mapping {
         }
         if !self.offset.is_finite() {
             return Err(format!("offset is {}", self.offset));
+        }
+        if !self.ahead_m.is_finite() || self.ahead_m != 0.0 && !Signal::POSE.contains(&signal) {
+            return Err(format!("ahead_m is {}: it is a pose's, in m", self.ahead_m));
         }
         if self.sign.abs() != 1.0 {
             return Err(format!("sign is {}, not 1 or -1", self.sign));

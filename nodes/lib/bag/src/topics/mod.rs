@@ -81,7 +81,8 @@ impl Role {
 /// A stream is a topic of the type that it needs (`odom: /car_state/odom`), or of another known type (Autoware's, a stamped twist); one without
 /// an entry is found by its type, and an empty name leaves it out. A signal is any field of any message
 /// (`steering: {topic: /commands/servo/position, field: data, gain: -1.2135, offset: 0.5304}`, see [`Mapping`]), and goes before the stream
-/// that it belongs to. `pose: /tracked_pose` is short for its three signals.
+/// that it belongs to. `pose: /tracked_pose` is short for its three signals; `pose: {topic: /tracked_pose, ahead_m: -0.16}` says that its point is not
+/// the centre of gravity.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TopicMap {
     /// Odometry.
@@ -94,6 +95,8 @@ pub struct TopicMap {
     pub wheels: Option<String>,
     /// Pose of a localisation of its own.
     pub pose: Option<String>,
+    /// How far ahead of the centre of gravity its point lies.
+    pub pose_ahead_m: f64,
     /// Road pictures.
     pub image: Option<String>,
     /// Road pictures, compressed.
@@ -164,12 +167,14 @@ impl TopicMap {
                 Entry::Topic(topic) => map.name(&name, topic)?,
                 // A stream may be said to be optional, and nothing else of it.
                 Entry::Field(mapping) if Signal::of(&name).is_none() => {
-                    let plain = Mapping { optional: mapping.optional, ..Mapping::of_topic(&mapping.topic) };
-                    if mapping != plain {
+                    let Mapping { optional, ahead_m, .. } = mapping;
+                    let plain = Mapping { optional, ahead_m, ..Mapping::of_topic(&mapping.topic) };
+                    if mapping != plain || ahead_m != 0.0 && name != "pose" {
                         return Err(format!(
-                            "`{name}` is a stream: it takes `topic` and `optional`, or its signals stand one by one"
+                            "`{name}` is a stream: it takes `topic` and `optional` (a pose `ahead_m`, too), or its signals stand one by one"
                         ));
                     }
+                    map.pose_ahead_m += ahead_m;
                     if mapping.optional {
                         map.optional.insert(name.clone());
                     }
@@ -259,7 +264,8 @@ impl TopicMap {
             };
         }
         if let Some(topic) = self.pose.as_deref().filter(|topic| !topic.is_empty()) {
-            signals.extend(Signal::POSE.map(|signal| (signal, Mapping::of_topic(topic))));
+            let mapping = Mapping { ahead_m: self.pose_ahead_m, ..Mapping::of_topic(topic) };
+            signals.extend(Signal::POSE.map(|signal| (signal, mapping.clone())));
         }
         signals.extend(self.signals.clone());
         let mapped = mapped::gather(mapped::Topics { path: bag.path(), topics: bag.topics() }, &signals)?;

@@ -198,6 +198,23 @@ fn any_field_of_any_message_is_a_signal() {
 }
 
 #[test]
+fn a_pose_of_another_point_is_moved_to_the_centre_of_gravity() {
+    let folder = TempDir::new().unwrap();
+    let path = write(&folder.path().join("run.db3"), &standard(200), false, &[]);
+    let of = |text: &str| read(&path, &TopicMap::parse(text).unwrap());
+    let (here, there) =
+        (of("odom: /odom\npose: /odom\n"), of("odom: /odom\npose: {topic: /odom, ahead_m: -0.2}\n"));
+    assert!(!here.pose_time_s.is_empty() && here.pose_yaw_rad == there.pose_yaw_rad);
+    for k in 0..here.pose_time_s.len() {
+        let turned = |f: fn(f32) -> f32| 0.2 * (f(here.pose_yaw_rad[k]) - f(here.pose_yaw_rad[0]));
+        assert!((there.pose_x_m[k] - here.pose_x_m[k] - turned(f32::cos)).abs() < 1e-5);
+        assert!((there.pose_y_m[k] - here.pose_y_m[k] - turned(f32::sin)).abs() < 1e-5);
+    }
+    let refused = TopicMap::parse("odom: {topic: /odom, ahead_m: 0.1}").unwrap_err();
+    assert!(refused.contains("a pose `ahead_m`"), "{refused}");
+}
+
+#[test]
 fn the_text_of_a_type_may_lie_beside_the_bag_and_without_it_the_way_on_is_told() {
     let folder = TempDir::new().unwrap();
     let path = write(&folder.path().join("own.db3"), &own_topics(200), false, &[]);

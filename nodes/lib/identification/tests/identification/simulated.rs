@@ -201,12 +201,92 @@ fn telemetry_that_cannot_tell_is_refused_with_a_figure() {
         ("standing", StateSequence { v_x_mps: small(&sequence.v_x_mps, 0.01), ..cut(n) }),
         ("straight", StateSequence { steering_rad: small(&sequence.steering_rad, 1e-3), ..cut(n) }),
         ("no v_y", StateSequence { v_y_mps: vec![0.0; n], ..cut(n) }),
+        ("v_y stuck", StateSequence { v_y_mps: vec![0.3; n], ..cut(n) }),
     ];
     for (name, sequence) in cases {
         let outcome = identify(&sequence, &vehicle, None, None, &quick(), &mut |_| {}).unwrap();
-        assert!(!outcome.accepted && outcome.reasons.len() == 1 && !outcome.drive_next.is_empty(), "{name}");
+        assert!(!outcome.accepted && !outcome.reasons.is_empty(), "{name}");
         assert!(outcome.phi_p.is_finite(), "{name}");
     }
+}
+
+#[test]
+fn a_signal_that_is_turned_or_in_another_unit_is_refused_with_the_line_that_mends_it() {
+    let (_, honest, vehicle) = drive(scenario("f1tenth", "club", 0.9, 0.9, 9).duration(20.0));
+    let scaled = |v: &mut Vec<f32>, by: f32| v.iter_mut().for_each(|x| *x *= by);
+    type Lie<'a> = (&'a str, Box<dyn Fn(&mut StateSequence)>);
+    let lies: [Lie<'_>; 5] = [
+        (
+            "`steering` or `yaw_rate: {topic: ..., field: ..., sign: -1}`",
+            Box::new(move |s| scaled(&mut s.steering_rad, -1.0)),
+        ),
+        (
+            "`steering: {topic: ..., field: ..., unit: deg}`",
+            Box::new(move |s| scaled(&mut s.steering_rad, 57.3)),
+        ),
+        ("`v_x: {topic: ..., field: ..., unit: km/h}`", Box::new(move |s| scaled(&mut s.v_x_mps, 3.6))),
+        (
+            "`yaw_rate: {topic: ..., field: ..., sign: -1}`",
+            Box::new(move |s| scaled(&mut s.yaw_rate_radps, -1.0)),
+        ),
+        ("`v_y: {topic: ..., field: ..., sign: -1}`", Box::new(move |s| scaled(&mut s.v_y_mps, -1.0))),
+    ];
+    for (line, lie) in lies {
+        let mut sequence = honest.clone();
+        lie(&mut sequence);
+        let outcome = identify(&sequence, &vehicle, None, None, &quick(), &mut |_| {}).unwrap();
+        assert!(
+            !outcome.accepted && outcome.reasons.iter().any(|r| r.contains(line)),
+            "{line}: {:?}",
+            outcome.reasons
+        );
+    }
+    // A unit that nothing is fitted to is not worth a refusal.
+    let mut imu = honest.clone();
+    scaled(&mut imu.a_y_mps2, 1.0 / 9.81);
+    scaled(&mut imu.gyro_yaw_rate_radps, 57.3);
+    let outcome = identify(&imu, &vehicle, None, None, &quick(), &mut |_| {}).unwrap();
+    assert!(outcome.accepted, "{:?}", outcome.reasons);
+}
+
+/// Poses of a localisation of its own at 40 Hz, 2 cm and half a degree, 50 ms late, in place of the odometry's.
+fn localised(sequence: &StateSequence) -> StateSequence {
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, Normal};
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+    let mut noise = |sigma: f64| Normal::new(0.0, sigma).unwrap().sample(&mut random) as f32;
+    let mut s = sequence.clone();
+    let [x, y, yaw] = [&mut s.x_m, &mut s.y_m, &mut s.yaw_rad].map(std::mem::take);
+    for k in (0..s.len()).step_by(2) {
+        s.pose_time_s.push(s.time_s[k] + 0.05);
+        s.pose_x_m.push(x[k] + noise(0.02));
+        s.pose_y_m.push(y[k] + noise(0.02));
+        s.pose_yaw_rad.push(yaw[k] + noise(0.0087));
+    }
+    s
+}
+
+#[test]
+fn tires_are_found_without_a_v_y_that_is_measured() {
+    let (recording, sequence, vehicle) = drive(with_background(scenario("f1tenth", "club", 0.9, 0.9, 3)));
+    let measured = identify(&sequence, &vehicle, None, None, &quick(), &mut |_| {}).unwrap();
+    let mut without = localised(&sequence);
+    without.v_y_mps.fill(0.0);
+    let outcome = identify(&without, &vehicle, None, None, &quick(), &mut |_| {}).unwrap();
+    let estimated = outcome.recorded.estimated.clone().unwrap();
+    assert!((estimated.pose_delay_s.unwrap().value - 0.05).abs() < 0.01, "{estimated:?}");
+    assert!(outcome.reasons.iter().any(|r| r.contains("was estimated from poses")), "{:?}", outcome.reasons);
+    assert!(outcome.accepted, "{:?}", outcome.reasons);
+    let error = errors(&outcome.found, &recording, &vehicle);
+    assert!(error.front < 0.06 && error.rear < 0.06, "{error:?}");
+    let k = |o: &gripsight_identification::Outcome| o.cornering_stiffness_n_per_rad;
+    approx::assert_relative_eq!(k(&outcome).front.value, k(&measured).front.value, max_relative = 0.15);
+    approx::assert_relative_eq!(k(&outcome).rear.value, k(&measured).rear.value, max_relative = 0.15);
+    // The same car seen by what another model made of it: replaced, and said.
+    let mut lying = localised(&sequence);
+    lying.v_y_mps.iter_mut().zip(&sequence.yaw_rate_radps).for_each(|(v, r)| *v = 0.5 * *v + 0.03 * r);
+    let outcome = identify(&lying, &vehicle, None, None, &quick(), &mut |_| {}).unwrap();
+    assert_eq!(outcome.recorded.estimated.unwrap().channels[0].channel, "v_y_mps");
 }
 
 #[test]
@@ -214,16 +294,13 @@ fn broken_telemetry_is_an_error() {
     let (_, sequence, vehicle) = drive(scenario("f1tenth", "club", 0.9, 0.9, 9).duration(12.0));
     let mut nan = sequence.clone();
     nan.v_y_mps[100] = f32::NAN;
-    let mut frozen = sequence.clone();
-    let stuck = frozen.v_y_mps[300];
-    frozen.v_y_mps[300..1000].fill(stuck);
+    let stuck = sequence.v_y_mps[300];
     let mut stuck_for_a_second = sequence.clone();
     stuck_for_a_second.v_y_mps[300..400].fill(stuck);
     let mut backwards = sequence.clone();
     backwards.time_s[50] = backwards.time_s[48];
     let start = |s: &StateSequence| Identification::start(s, &vehicle, None, None, &quick()).unwrap_err();
     assert!(matches!(start(&nan), IdentificationError::Signal(_)));
-    assert!(matches!(start(&frozen), IdentificationError::Frozen { channel: "v_y_mps", .. }));
     assert!(matches!(start(&backwards), IdentificationError::Signal(_)));
     assert!(Identification::start(&stuck_for_a_second, &vehicle, None, None, &quick()).is_ok());
 }

@@ -2,17 +2,18 @@
 //!
 //! A check compares two ways to the same change over short spans (half a second): the turn by the heading and by the yaw rate, the way by the
 //! pose and by the speed, the sideways way and v_y, the change of v_y and the accelerations. The slope of one over the other is one where
-//! both are right; it is estimated robustly (Theil and Sen's median of slopes, weighted by their span; Sen, JASA 63 (1968) 1379) with an
-//! interval from leaving out blocks of spans in turn. Nothing is rescaled: a check yields a typed [`Finding`], and only what a topics file
+//! both are right; it is estimated robustly (Theil and Sen's median of slopes, weighted by their span; Sen, JASA 63 (1968) 1379; Tukey's bisquare
+//! where something else moves one of them too) with an interval from leaving out blocks of spans in turn. Nothing is rescaled: a check yields a typed [`Finding`], and only what a topics file
 //! states changes data.
 
 mod robust;
 mod spans;
+mod words;
 
 use serde::Serialize;
 
 use crate::{SignalError, StateSequence};
-use robust::{Slope, slope};
+use robust::{Slope, ratio, slope, slope_beside};
 use spans::Spans;
 
 /// What is compared.
@@ -35,6 +36,8 @@ pub enum Pair {
     LateralSpeedAndAcceleration,
     /// The measured steering angle and the command.
     MeasuredAndCommandedSteering,
+    /// The steering angle and that of the curve driven, wheelbase times yaw rate over v_x.
+    SteeringAndCurvature,
 }
 
 /// What a check found.
@@ -47,6 +50,8 @@ pub enum Finding {
     Sign,
     /// One is in another unit.
     Unit {
+        /// Which, as topics files name it.
+        signal: &'static str,
         /// The unit that its values would fit.
         probably: &'static str,
     },
@@ -137,11 +142,36 @@ impl Checks {
 const TOLERANCE: f64 = 0.04;
 /// An interval wider than this tells nothing.
 const TOO_WIDE: f64 = 0.6;
-/// Turns of unit between two signals of one kind, first over second.
-const ANGLES: [(f64, &str); 2] =
-    [(180.0 / std::f64::consts::PI, "deg and deg/s"), (std::f64::consts::PI / 180.0, "rad beside deg")];
-const SPEEDS: [(f64, &str); 3] = [(3.6, "km/h"), (2.236_94, "mph"), (1.943_84, "kn")];
-const FORCES: [(f64, &str); 1] = [(1.0 / 9.806_65, "g")];
+/// v_y follows an accelerometer or a pose no better than this: a lag of its filter, a unit on a body that pitches and rolls.
+const TOLERANCE_V_Y: f64 = 0.1;
+
+const DEG: f64 = 180.0 / std::f64::consts::PI;
+const G: f64 = 1.0 / 9.806_65;
+const KMH: f64 = 3.6;
+const MPH: f64 = 2.236_94;
+const KN: f64 = 1.943_84;
+
+impl Pair {
+    /// First over second where a signal is in another unit: the factor, the signal, its unit.
+    fn units(self) -> &'static [(f64, &'static str, &'static str)] {
+        match self {
+            Self::YawRateAndHeading => &[(DEG, "yaw_rate", "deg/s"), (1.0 / DEG, "heading", "deg")],
+            Self::YawRateAndGyro => &[(DEG, "yaw_rate", "deg/s"), (1.0 / DEG, "gyro_yaw_rate", "deg/s")],
+            Self::SpeedAndPose => &[(KMH, "v_x", "km/h"), (MPH, "v_x", "mph"), (KN, "v_x", "kn")],
+            Self::LateralAccelerationAndMotion => &[
+                (G, "a_y", "g"),
+                (1.0 / KMH, "v_x", "km/h"),
+                (1.0 / MPH, "v_x", "mph"),
+                (1.0 / DEG, "yaw_rate", "deg/s"),
+            ],
+            Self::ForwardAccelerationAndMotion => &[(G, "a_x", "g"), (1.0 / KMH, "v_x", "km/h")],
+            Self::MeasuredAndCommandedSteering => {
+                &[(DEG, "measured_steering", "deg"), (1.0 / DEG, "steering", "deg")]
+            }
+            Self::LateralSpeedAndPose | Self::LateralSpeedAndAcceleration | Self::SteeringAndCurvature => &[],
+        }
+    }
+}
 
 /// Compares the signals of a sequence.
 ///
@@ -151,45 +181,98 @@ pub fn cross_check(sequence: &StateSequence) -> Result<Checks, SignalError> {
     sequence.check()?;
     let spans = Spans::of(sequence);
     let mut all = Checks::default();
-    let mut add = |pair, made: Option<(Vec<f64>, Vec<f64>)>, least: f64, units: &[(f64, &'static str)]| {
-        if let Some((first, second)) = made {
-            all.checks.push(judged(pair, &first, &second, least, units));
-        }
+    let mut add = |pair, first: &[f64], second: &[f64], found: Option<Slope>| {
+        let with_pose =
+            matches!(pair, Pair::YawRateAndHeading | Pair::SpeedAndPose | Pair::LateralSpeedAndPose);
+        let same = with_pose && spans.poses_are_integral
+            || first.iter().zip(second).all(|(a, b)| (a - b).abs() <= 1e-6 * (1.0 + b.abs()));
+        let finding = if same { Finding::SameSource } else { judged(pair, found) };
+        let unknown = Slope { value: f64::NAN, low: f64::NAN, high: f64::NAN, offset: f64::NAN };
+        let Slope { value, low, high, offset } = found.unwrap_or(unknown);
+        all.checks.push(Check { pair, ratio: value, low, high, offset, spans: first.len(), finding });
     };
-    add(Pair::YawRateAndHeading, spans.turns(), 0.05, &ANGLES);
-    add(Pair::YawRateAndGyro, spans.gyro(), 0.05, &ANGLES);
-    add(Pair::SpeedAndPose, spans.ways(), 0.1, &SPEEDS);
-    add(Pair::LateralSpeedAndPose, spans.sideways(), 0.01, &[]);
-    add(Pair::LateralAccelerationAndMotion, spans.lateral_forces(), 0.5, &FORCES);
-    add(Pair::ForwardAccelerationAndMotion, spans.forward_forces(), 0.3, &FORCES);
-    add(Pair::LateralSpeedAndAcceleration, spans.slipping(), 0.02, &[]);
-    add(Pair::MeasuredAndCommandedSteering, spans.steering(), 0.01, &ANGLES);
+    if let Some((first, second)) = spans.turns() {
+        add(Pair::YawRateAndHeading, &first, &second, slope(&first, &second, 0.05));
+    }
+    if let Some((first, second)) = spans.gyro() {
+        add(Pair::YawRateAndGyro, &first, &second, slope(&first, &second, 0.05));
+    }
+    if let Some((first, second)) = spans.ways() {
+        add(Pair::SpeedAndPose, &first, &second, ratio(&first, &second, 0.1));
+    }
+    if let Some((by_pose, by_speed, [turned])) = spans.sideways() {
+        // The pose's noise must not lower the slope: it stands on the left, and the share is the slope's inverse.
+        let found = slope_beside(&by_pose, &by_speed, &[&turned], 0.005).map(Slope::inverse);
+        add(Pair::LateralSpeedAndPose, &by_speed, &by_pose, found);
+    }
+    if let Some((force, motion, [turning])) = spans.lateral_forces() {
+        let found = slope_beside(&force, &motion, &[&turning], 0.2);
+        add(Pair::LateralAccelerationAndMotion, &force, &motion, found);
+    }
+    if let Some((first, second)) = spans.forward_forces() {
+        add(Pair::ForwardAccelerationAndMotion, &first, &second, slope(&first, &second, 0.3));
+    }
+    if let Some((change, left, [turned, turning])) = spans.slipping() {
+        let found = slope_beside(&change, &left, &[&turned, &turning], 0.02);
+        add(Pair::LateralSpeedAndAcceleration, &change, &left, found);
+    }
+    if let Some((first, second)) = spans.steering() {
+        add(Pair::MeasuredAndCommandedSteering, &first, &second, slope(&first, &second, 0.01));
+    }
     all.unchecked = unchecked(&all, sequence);
     Ok(all)
 }
 
-fn judged(pair: Pair, first: &[f64], second: &[f64], least: f64, units: &[(f64, &'static str)]) -> Check {
-    let same = first.iter().zip(second).all(|(a, b)| (a - b).abs() <= 1e-6 * (1.0 + b.abs()));
-    let found = slope(first, second, least);
-    let Slope { value, low, high, offset } =
-        found.unwrap_or(Slope { value: f64::NAN, low: f64::NAN, high: f64::NAN, offset: f64::NAN });
+/// The steering against the curves driven: its sign and unit, and nothing finer, since tires slip.
+///
+/// # Errors
+/// What [`StateSequence::check`] finds.
+pub fn steering_check(sequence: &StateSequence, wheelbase_m: f64) -> Result<Option<Check>, SignalError> {
+    /// A car that understeers as hard as any, or slides, takes this many times the angle of its curve; one that drifts, less than none at times.
+    const MOST: f64 = 6.0;
+    sequence.check()?;
+    let spans = Spans::of(sequence);
+    let Some((steering, angle)) = spans.curvature(wheelbase_m) else { return Ok(None) };
+    let pair = Pair::SteeringAndCurvature;
+    Ok(slope(&steering, &angle, 0.01).map(|Slope { value, low, high, offset }| {
+        let finding = if value.abs() > MOST && (value.abs() / DEG).ln().abs() < MOST.ln() {
+            Finding::Unit { signal: "steering", probably: "deg" }
+        } else if high < 0.0 {
+            Finding::Sign
+        } else if low > 1.0 / MOST && high < MOST {
+            Finding::Agrees
+        } else {
+            Finding::NotTold
+        };
+        Check { pair, ratio: value, low, high, offset, spans: steering.len(), finding }
+    }))
+}
+
+fn judged(pair: Pair, found: Option<Slope>) -> Finding {
+    let Some(Slope { value, low, high, .. }) = found.filter(|s| s.value.is_finite()) else {
+        return Finding::NotTold;
+    };
+    let of_v_y = matches!(pair, Pair::LateralSpeedAndPose | Pair::LateralSpeedAndAcceleration);
+    let tolerance = if of_v_y { TOLERANCE_V_Y } else { TOLERANCE };
     let near = |factor: f64| (value / factor - 1.0).abs() < 0.15;
-    let finding = if same {
-        Finding::SameSource
-    } else if !value.is_finite() || high - low > TOO_WIDE * value.abs().max(1.0) {
-        Finding::NotTold
-    } else if low - TOLERANCE <= 1.0 && 1.0 <= high + TOLERANCE {
-        Finding::Agrees
-    } else if let Some((_, probably)) = units.iter().find(|(factor, _)| near(*factor) || near(-factor)) {
-        Finding::Unit { probably }
-    } else if low <= -1.0 + 0.3 && high >= -1.0 - 0.3 && value < 0.0 {
+    let told = high - low <= TOO_WIDE * value.abs().max(1.0);
+    if low - tolerance <= 1.0 && 1.0 <= high + tolerance {
+        return if told { Finding::Agrees } else { Finding::NotTold };
+    }
+    if !told {
+        return Finding::NotTold;
+    }
+    if let Some(&(_, signal, probably)) =
+        pair.units().iter().find(|(factor, ..)| near(*factor) || near(-factor))
+    {
+        Finding::Unit { signal, probably }
+    } else if high < 0.0 && low < -0.5 && high > -2.0 {
         Finding::Sign
-    } else if matches!(pair, Pair::LateralSpeedAndPose | Pair::LateralSpeedAndAcceleration) {
+    } else if of_v_y {
         Finding::NotMeasured { share: value }
     } else {
         Finding::Scale { factor: value }
-    };
-    Check { pair, ratio: value, low, high, offset, spans: first.len(), finding }
+    }
 }
 
 fn unchecked(all: &Checks, sequence: &StateSequence) -> Vec<Unchecked> {

@@ -1,6 +1,6 @@
 //! The same change over a span by two ways.
 
-use crate::{Poses, StateSequence};
+use crate::{Poses, StateSequence, is_integral_of_twist, pose_delay_s};
 
 /// Long enough that noise averages out and a delay of a localisation matters little, short enough that a drift does not.
 const SPAN_S: f64 = 0.5;
@@ -12,8 +12,12 @@ pub(super) struct Spans<'a> {
     sequence: &'a StateSequence,
     poses: Poses,
     spans: Vec<(usize, usize)>,
+    /// Whether the poses are nothing but the integral of the speeds.
+    pub(super) poses_are_integral: bool,
 }
 
+/// The same change by two ways, and what else moves the first.
+type Beside<const N: usize> = Option<(Vec<f64>, Vec<f64>, [Vec<f64>; N])>;
 type Pairs = Option<(Vec<f64>, Vec<f64>)>;
 
 impl<'a> Spans<'a> {
@@ -29,7 +33,11 @@ impl<'a> Spans<'a> {
                 from = k;
             }
         }
-        Self { sequence, poses: sequence.poses(), spans }
+        let mut poses = sequence.poses();
+        // A localisation says where the car was.
+        let delay_s = pose_delay_s(sequence, &poses).map_or(0.0, |(delay_s, _)| delay_s);
+        poses.time_s.iter_mut().for_each(|t| *t -= delay_s);
+        Self { sequence, poses, spans, poses_are_integral: is_integral_of_twist(sequence) }
     }
 
     /// Integral of a channel over a span, by the trapezoid.
@@ -90,18 +98,24 @@ impl<'a> Spans<'a> {
         let s = self.sequence;
         self.pairs(!self.poses.time_s.is_empty(), |span| {
             let [a, b] = self.ends(span)?;
-            // The way is the arc, and poses give its chord.
+            // The way is the arc, and poses give its chord; against the heading it counts backwards.
             let half = 0.5 * (b[2] - a[2]).abs();
             let arc = if half > 1e-3 { half / half.sin() } else { 1.0 };
-            let way = (b[0] - a[0]).hypot(b[1] - a[1]) * arc.clamp(1.0, 2.0);
-            let speed = |k: usize| f64::from(s.v_x_mps[k]).hypot(s.v_y_mps[k].into());
+            let (sin, cos) = (0.5 * (a[2] + b[2])).sin_cos();
+            let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+            let way = dx.hypot(dy) * arc.clamp(1.0, 2.0) * (cos * dx + sin * dy).signum();
+            let speed = |k: usize| {
+                let (v_x, v_y) = (f64::from(s.v_x_mps[k]), f64::from(s.v_y_mps[k]));
+                v_x.hypot(v_y) * v_x.signum()
+            };
             Some((self.integral_of(speed, span), way))
         })
     }
 
-    pub(super) fn sideways(&self) -> Pairs {
+    /// The sideways way by the pose and by v_y, and the turn: v_y may be of another point than the pose.
+    pub(super) fn sideways(&self) -> Beside<1> {
         let s = self.sequence;
-        self.pairs(!self.poses.time_s.is_empty() && s.has_v_y(), |span| {
+        let rows = self.rows(!self.poses.time_s.is_empty() && s.has_v_y(), |span| {
             let [a, b] = self.ends(span)?;
             let t = &s.time_s;
             let middle = 0.5 * (a[2] + b[2]);
@@ -116,21 +130,38 @@ impl<'a> Spans<'a> {
                 by_speed += 0.5 * f64::from(s.v_x_mps[k] + s.v_x_mps[k + 1]) * dt * heading.sin();
                 by_slip += 0.5 * f64::from(s.v_y_mps[k] + s.v_y_mps[k + 1]) * dt * heading.cos();
             }
-            Some((by_slip, moved - by_speed))
-        })
+            Some([moved - by_speed, by_slip, b[2] - a[2]])
+        })?;
+        let column = |j: usize| rows.iter().map(|r| r[j]).collect::<Vec<_>>();
+        Some((column(0), column(1), [column(2)]))
     }
 
-    pub(super) fn lateral_forces(&self) -> Pairs {
+    /// Numbers of every span; `None` where a way is not recorded.
+    fn rows<const N: usize>(
+        &self,
+        recorded: bool,
+        of: impl Fn((usize, usize)) -> Option<[f64; N]>,
+    ) -> Option<Vec<[f64; N]>> {
+        let rows: Vec<[f64; N]> =
+            if recorded { self.spans.iter().filter_map(|&span| of(span)).collect() } else { Vec::new() };
+        (rows.len() >= 20).then_some(rows)
+    }
+
+    /// a_y and what the motion takes, and the turning's change: the inertial unit may sit ahead of the point of v_y.
+    pub(super) fn lateral_forces(&self) -> Beside<1> {
         let s = self.sequence;
-        self.pairs(!s.a_y_mps2.is_empty(), |span| {
+        let rows = self.rows(!s.a_y_mps2.is_empty(), |span| {
             let turning = |k: usize| f64::from(s.v_x_mps[k]) * f64::from(s.yaw_rate_radps[k]);
-            let change = f64::from(s.v_y_mps[span.1] - s.v_y_mps[span.0]);
             let duration_s = self.duration_s(span);
-            Some((
+            let change = |v: &[f32]| f64::from(v[span.1] - v[span.0]) / duration_s;
+            Some([
                 self.integral(&s.a_y_mps2, span) / duration_s,
-                (self.integral_of(turning, span) + change) / duration_s,
-            ))
-        })
+                self.integral_of(turning, span) / duration_s + change(&s.v_y_mps),
+                change(&s.yaw_rate_radps),
+            ])
+        })?;
+        let column = |j: usize| rows.iter().map(|r| r[j]).collect::<Vec<_>>();
+        Some((column(0), column(1), [column(2)]))
     }
 
     pub(super) fn forward_forces(&self) -> Pairs {
@@ -146,13 +177,18 @@ impl<'a> Spans<'a> {
         })
     }
 
-    pub(super) fn slipping(&self) -> Pairs {
+    /// The change of v_y and what a_y leaves for it; and the turning (an accelerometer's scale, a body's roll) and its change (the unit's place).
+    pub(super) fn slipping(&self) -> Beside<2> {
         let s = self.sequence;
-        self.pairs(!s.a_y_mps2.is_empty() && s.has_v_y(), |span| {
+        let rows = self.rows(!s.a_y_mps2.is_empty() && s.has_v_y(), |span| {
             let turning = |k: usize| f64::from(s.v_x_mps[k]) * f64::from(s.yaw_rate_radps[k]);
-            let change = f64::from(s.v_y_mps[span.1] - s.v_y_mps[span.0]);
-            Some((change, self.integral(&s.a_y_mps2, span) - self.integral_of(turning, span)))
-        })
+            let change = |v: &[f32]| f64::from(v[span.1] - v[span.0]);
+            let turned = self.integral_of(turning, span);
+            let left = self.integral(&s.a_y_mps2, span) - turned;
+            Some([change(&s.v_y_mps), left, turned, change(&s.yaw_rate_radps)])
+        })?;
+        let column = |j: usize| rows.iter().map(|r| r[j]).collect::<Vec<_>>();
+        Some((column(0), column(1), [column(2), column(3)]))
     }
 
     pub(super) fn steering(&self) -> Pairs {
@@ -164,6 +200,19 @@ impl<'a> Spans<'a> {
                 self.integral(&s.measured_steering_rad, span) / duration_s,
                 self.integral(&s.steering_rad, span) / duration_s,
             ))
+        })
+    }
+
+    /// The steering and the curvature's angle L r / v_x, at spans in which the car moves.
+    pub(super) fn curvature(&self, wheelbase_m: f64) -> Pairs {
+        const SLOW_MPS: f64 = 0.5;
+        let s = self.sequence;
+        self.pairs(true, |span| {
+            let duration_s = self.duration_s(span);
+            let v_mps = self.integral(&s.v_x_mps, span) / duration_s;
+            let turned = self.integral(&s.yaw_rate_radps, span) / duration_s;
+            (v_mps.abs() > SLOW_MPS)
+                .then(|| (self.integral(&s.steering_rad, span) / duration_s, wheelbase_m * turned / v_mps))
         })
     }
 }

@@ -10,7 +10,7 @@ fn honest() -> StateSequence {
     let mut s = StateSequence { time_s: (0..N).map(|k| k as f32 * 0.01).collect(), ..Default::default() };
     let (mut x, mut y, mut yaw) = (0.0_f64, 0.0_f64, 0.0_f64);
     let noise = |k: usize, n: f64| ((k as f64 * 12.9898 + n).sin() * 43_758.547).fract() * 0.01;
-    let slip = |t: f64| 0.25 * (1.7 * t - 0.4).sin() * (0.13 * t).cos();
+    let slip = |t: f64| 0.2 * (1.7 * t - 0.4).sin() * (0.13 * t).cos() + 0.15 * (0.9 * t).sin();
     for k in 0..N {
         let t = k as f64 * dt;
         let (v, r) = (5.0 + (0.4 * t).sin(), 1.2 * (1.7 * t).sin() * (0.13 * t).cos());
@@ -64,13 +64,19 @@ fn scales_signs_and_units_are_named() {
     };
     approx::assert_abs_diff_eq!(factor, 1.1, epsilon = 0.02);
     let kmh = with(|s| scaled(&mut s.v_x_mps, 3.6));
-    assert_eq!(kmh.of(Pair::SpeedAndPose).unwrap().finding, Finding::Unit { probably: "km/h" });
+    assert_eq!(
+        kmh.of(Pair::SpeedAndPose).unwrap().finding,
+        Finding::Unit { signal: "v_x", probably: "km/h" }
+    );
     let turned = with(|s| scaled(&mut s.yaw_rate_radps, -1.0));
     assert_eq!(turned.of(Pair::YawRateAndHeading).unwrap().finding, Finding::Sign);
     let degrees = with(|s| scaled(&mut s.gyro_yaw_rate_radps, 57.295_78));
     assert!(matches!(degrees.of(Pair::YawRateAndGyro).unwrap().finding, Finding::Unit { .. }));
     let g = with(|s| scaled(&mut s.a_y_mps2, 1.0 / 9.81));
-    assert_eq!(g.of(Pair::LateralAccelerationAndMotion).unwrap().finding, Finding::Unit { probably: "g" });
+    assert_eq!(
+        g.of(Pair::LateralAccelerationAndMotion).unwrap().finding,
+        Finding::Unit { signal: "a_y", probably: "g" }
+    );
 }
 
 #[test]
@@ -112,4 +118,65 @@ fn what_nothing_recorded_checks_is_listed() {
     });
     let signals: Vec<&str> = bare.unchecked.iter().map(|u| u.signal).collect();
     assert_eq!(signals, ["yaw_rate_radps", "v_x_mps", "v_y_mps", "steering_rad"]);
+}
+
+#[test]
+fn a_v_y_of_another_point_is_measured_all_the_same() {
+    let ahead = with(|s| {
+        for k in 0..N {
+            s.v_y_mps[k] += 0.5 * s.yaw_rate_radps[k];
+        }
+    });
+    for pair in [Pair::LateralSpeedAndPose, Pair::LateralSpeedAndAcceleration] {
+        assert_eq!(ahead.of(pair).unwrap().finding, Finding::Agrees, "{ahead:?}");
+    }
+}
+
+#[test]
+fn a_body_that_rolls_does_not_speak_against_v_y() {
+    let rolling = with(|s| scaled(&mut s.a_y_mps2, 1.06));
+    let share = rolling.of(Pair::LateralSpeedAndAcceleration).unwrap();
+    assert_eq!(share.finding, Finding::Agrees, "{share:?}");
+    assert!(rolling.of(Pair::LateralAccelerationAndMotion).unwrap().finding.disagrees());
+}
+
+#[test]
+fn a_late_localisation_agrees() {
+    let mut late = honest();
+    late.pose_time_s = late.time_s.iter().step_by(3).map(|t| t + 0.06).collect();
+    late.pose_x_m = late.x_m.drain(..).step_by(3).collect();
+    late.pose_y_m = late.y_m.drain(..).step_by(3).collect();
+    late.pose_yaw_rad = late.yaw_rad.drain(..).step_by(3).collect();
+    let all = cross_check(&late).unwrap();
+    for pair in [Pair::YawRateAndHeading, Pair::SpeedAndPose, Pair::LateralSpeedAndPose] {
+        assert_eq!(all.of(pair).unwrap().finding, Finding::Agrees, "{all:?}");
+    }
+}
+
+#[test]
+fn a_pose_that_is_counted_together_from_the_speeds_checks_nothing() {
+    let mut counted = honest();
+    let (mut x, mut y) = (0.0_f64, 0.0_f64);
+    for k in 0..N {
+        (counted.x_m[k], counted.y_m[k]) = (x as f32, y as f32);
+        let (v_x, v_y) = (f64::from(counted.v_x_mps[k]), f64::from(counted.v_y_mps[k]));
+        let (sin, cos) = f64::from(counted.yaw_rad[k]).sin_cos();
+        x += 0.01 * (v_x * cos - v_y * sin);
+        y += 0.01 * (v_x * sin + v_y * cos);
+    }
+    let all = cross_check(&counted).unwrap();
+    assert_eq!(all.of(Pair::SpeedAndPose).unwrap().finding, Finding::SameSource);
+    assert!(all.unchecked.iter().any(|u| u.signal == "v_x_mps"));
+}
+
+#[test]
+fn steering_in_degrees_and_turned_is_told_by_the_curves() {
+    let of = |by: f32| {
+        let mut sequence = honest();
+        scaled(&mut sequence.steering_rad, by);
+        steering_check(&sequence, 0.33).unwrap().unwrap().finding
+    };
+    assert_eq!(of(1.0), Finding::Agrees);
+    assert_eq!(of(-1.0), Finding::Sign);
+    assert_eq!(of(57.295_78), Finding::Unit { signal: "steering", probably: "deg" });
 }

@@ -1,8 +1,7 @@
 //! How late poses are: the shift at which their heading follows the integrated yaw rate best.
 
-use gripsight_signals::{Poses, StateSequence};
-
-use crate::events::yaw_rates;
+use super::yaw_rates;
+use crate::{Poses, StateSequence};
 
 /// Delays tried.
 const LONGEST_S: f64 = 0.25;

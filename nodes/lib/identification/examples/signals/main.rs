@@ -1,0 +1,207 @@
+//! What becomes of recordings whose signals lie or are missing: drives of the reference car with known tires.
+//!
+//! ```text
+//! signals no_v_y FROM TO DURATION_S      v_y measured, and estimated from poses of four kinds of localisation
+//! signals lies FROM TO DURATION_S        signals scaled, turned, in other units, or made by an observer, with poses and an inertial unit and without
+//! signals bags FOLDER...                 bag folders: v_y as recorded, and estimated from the poses recorded
+//! signals honest FROM TO DURATION_S      what the cross checks give on honest drives: the tolerances rest on it
+//! ```
+//!
+//! Writes a row a run to standard output (csv); `signals.py` beside the results makes the tables of it.
+#[allow(dead_code)]
+#[path = "../accuracy/cases.rs"]
+mod cases;
+mod lies;
+#[allow(dead_code)]
+#[path = "../support/mod.rs"]
+mod support;
+
+use std::path::Path;
+
+use anyhow::{Result, bail};
+use gripsight_identification::{Config, FrictionPrior, Outcome, PerAxle, ResidualKind, Usable, identify};
+use gripsight_signals::StateSequence;
+use gripsight_vehicle::{MagicFormula, VehicleParameters};
+use lies::{LOCALISATIONS, lies, localised};
+use support::{Truth, floor, read, reference, truth_of};
+
+/// The seeds of the noise of poses are apart from those of drives.
+const POSE_SEED: u64 = 0x00b0_5e5e;
+
+fn quick() -> Config {
+    Config { residual: ResidualKind::None, ..Config::default() }
+}
+
+const HEADER: &str = "run,what,status,k_true_f,k_f,k_lo_f,k_hi_f,over_f,slip_f,d_true_f,d_f,k_true_r,k_r,k_lo_r,k_hi_r,over_r,slip_r,d_true_r,d_r,\
+    gradient_true,gradient,estimated,v_y_sigma,delay,reason";
+
+/// Largest promise above the true curve within the slips, over the largest true force driven.
+fn over(set: &MagicFormula, truth: &MagicFormula, within_rad: f64, shown: f64) -> f64 {
+    let slips = (1..=200).map(|k| within_rad * f64::from(k) / 200.0);
+    slips
+        .map(|slip| (set.normalized_force(slip) - truth.normalized_force(slip)) / shown)
+        .fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Difference of the slips that a lateral acceleration of a tenth of g takes front and rear, rad: the understeer gradient.
+fn gradient(stiffness: &PerAxle<f64>) -> f64 {
+    0.1 / stiffness.front - 0.1 / stiffness.rear
+}
+
+/// A row of one identification.
+fn row(
+    run: &str,
+    what: &str,
+    sequence: &StateSequence,
+    vehicle: &VehicleParameters,
+    truth: Option<&PerAxle<MagicFormula>>,
+    prior: Option<FrictionPrior>,
+) -> String {
+    let outcome = match identify(sequence, vehicle, prior, None, &quick(), &mut |_| {}) {
+        Ok(outcome) => outcome,
+        Err(error) => return format!("{run},{what},failed{}\"{error}\"", ",".repeat(22)),
+    };
+    let mut cells = vec![run.to_owned(), what.to_owned(), outcome.status.name().to_owned()];
+    let o = &outcome;
+    let loads_n = PerAxle { front: vehicle.static_load_front_n(), rear: vehicle.static_load_rear_n() };
+    let axle = |front: bool| -> Vec<f64> {
+        let pick = |p: &PerAxle<f64>| if front { p.front } else { p.rear };
+        let (k, slip) = if front {
+            (o.cornering_stiffness_n_per_rad.front, o.slip_range_rad.front)
+        } else {
+            (o.cornering_stiffness_n_per_rad.rear, o.slip_range_rad.rear)
+        };
+        let (set, found) = if front { (o.phi_p.front, o.found.front) } else { (o.phi_p.rear, o.found.rear) };
+        let true_curve = truth.map(|t| if front { t.front } else { t.rear });
+        let driven = slip.high.max(-slip.low);
+        let valid = pick(&o.valid_within.slip_rad);
+        let within = if valid.is_finite() { valid } else { driven };
+        let load_n = pick(&loads_n);
+        let shown = |t: &MagicFormula| t.max_force_within(driven);
+        let nan = f64::NAN;
+        vec![
+            true_curve.map_or(nan, |t| t.normalized_stiffness() * load_n),
+            k.value,
+            k.low,
+            k.high,
+            true_curve.filter(|_| o.accepted).map_or(nan, |t| over(&set, &t, within, shown(&t))),
+            driven,
+            true_curve.map_or(nan, |t| shown(&t)),
+            found.max_force_within(driven),
+        ]
+    };
+    cells.extend(axle(true).iter().chain(&axle(false)).map(|v| format!("{v:.4}")));
+    let normalized = |t: &PerAxle<MagicFormula>| t.map(|a| a.normalized_stiffness());
+    let found =
+        PerAxle { front: o.found.front.normalized_stiffness(), rear: o.found.rear.normalized_stiffness() };
+    let fitted = o.least_squares.is_some();
+    cells.push(format!("{:.5}", truth.map_or(f64::NAN, |t| gradient(&normalized(t)))));
+    cells.push(format!("{:.5}", if fitted { gradient(&found) } else { f64::NAN }));
+    cells.extend(estimated(o));
+    cells.push(format!("\"{}\"", o.reasons.join(" | ").replace('"', "'")));
+    cells.join(",")
+}
+
+/// Channels estimated, the standard deviation of v_y, and the delay of the poses.
+fn estimated(outcome: &Outcome) -> [String; 3] {
+    let Some(motion) = &outcome.recorded.estimated else {
+        return [String::new(), String::new(), String::new()];
+    };
+    let names: Vec<&str> = motion.channels.iter().map(|c| c.channel).collect();
+    let sigma = motion
+        .channels
+        .iter()
+        .filter(|c| c.channel == "v_y_mps")
+        .map(|c| format!("{:.4}", c.sigma))
+        .collect();
+    let delay = motion.pose_delay_s.map(|d| format!("{:.4}", d.value)).unwrap_or_default();
+    [names.join(" "), sigma, delay]
+}
+
+struct Drive {
+    name: String,
+    sequence: StateSequence,
+    vehicle: VehicleParameters,
+    truth: PerAxle<MagicFormula>,
+    mu: f64,
+}
+
+fn drawn(seed: u64, duration_s: f64) -> Result<Drive> {
+    let case = cases::draw(seed, duration_s)?;
+    let mu = case.scenario.friction.nominal();
+    let (recording, sequence, vehicle) = reference::drive(case.scenario);
+    let truth = truth_of(&recording, &vehicle);
+    let curve = |t: &Truth| floor(t).map(|(curve, _)| curve);
+    let truth = PerAxle { front: curve(&truth.front)?, rear: curve(&truth.rear)? };
+    Ok(Drive { name: case.name, sequence, vehicle, truth, mu })
+}
+
+fn main() -> Result<()> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let Some((mode, rest)) = arguments.split_first() else { bail!("no_v_y, lies, bags or honest?") };
+    if mode != "honest" {
+        println!("{HEADER}");
+    }
+    match (mode.as_str(), rest) {
+        ("no_v_y", [from, to, duration_s]) => {
+            for seed in from.parse::<u64>()?..to.parse()? {
+                let d = drawn(seed, duration_s.parse()?)?;
+                println!("{}", row(&d.name, "v_y measured", &d.sequence, &d.vehicle, Some(&d.truth), None));
+                for (what, localisation) in LOCALISATIONS {
+                    let mut sequence = localised(&d.sequence, localisation, seed ^ POSE_SEED);
+                    sequence.v_y_mps.fill(0.0);
+                    println!("{}", row(&d.name, what, &sequence, &d.vehicle, Some(&d.truth), None));
+                }
+            }
+        }
+        ("lies", [from, to, duration_s]) => {
+            for seed in from.parse::<u64>()?..to.parse()? {
+                let d = drawn(seed, duration_s.parse()?)?;
+                let prior = Some(FrictionPrior { mu: d.mu + 0.33, sigma: 0.1 });
+                let what = "friction prior 0.33 too high; beside it poses and IMU";
+                println!("{}", row(&d.name, what, &d.sequence, &d.vehicle, Some(&d.truth), prior));
+                for (what, sequence) in lies(&d.sequence, &d.vehicle, &d.truth, seed ^ POSE_SEED) {
+                    println!("{}", row(&d.name, &what, &sequence, &d.vehicle, Some(&d.truth), None));
+                }
+            }
+        }
+        ("bags", folders) => {
+            for folder in folders.iter().map(Path::new) {
+                let (vehicle, sequence) = read(folder, f64::INFINITY)?;
+                let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                println!("{}", row(&name, "as recorded", &sequence, &vehicle, None, None));
+                let mut without = sequence.clone();
+                without.v_y_mps.fill(0.0);
+                println!("{}", row(&name, "without v_y", &without, &vehicle, None, None));
+            }
+        }
+        ("honest", [from, to, duration_s]) => {
+            println!("run,what,pair,finding,ratio,low,high,spans");
+            for seed in from.parse::<u64>()?..to.parse()? {
+                let d = drawn(seed, duration_s.parse()?)?;
+                honest(&d.name, "odometry", &d.sequence, &d.vehicle)?;
+                for (what, localisation) in LOCALISATIONS {
+                    honest(
+                        &d.name,
+                        what,
+                        &localised(&d.sequence, localisation, seed ^ POSE_SEED),
+                        &d.vehicle,
+                    )?;
+                }
+            }
+        }
+        _ => bail!("unknown arguments {arguments:?}"),
+    }
+    Ok(())
+}
+
+/// What every check gives.
+fn honest(run: &str, what: &str, sequence: &StateSequence, vehicle: &VehicleParameters) -> Result<()> {
+    for c in Usable::of(sequence, vehicle)?.recorded.checks.checks {
+        let [pair, finding] =
+            [serde_json::to_value(c.pair)?, serde_json::to_value(c.finding)?["kind"].clone()]
+                .map(|v| v.as_str().unwrap_or_default().to_owned());
+        println!("{run},{what},{pair},{finding},{:.4},{:.4},{:.4},{}", c.ratio, c.low, c.high, c.spans);
+    }
+    Ok(())
+}
