@@ -10,7 +10,6 @@ use gripsight_bag::{BagInfo, ReadReport, Role, TopicMap, Usable};
 use gripsight_signals::{Checks, DataHealth, Finding};
 
 use crate::Outcome;
-use crate::data::disagreement;
 use crate::notes::read_notes;
 
 /// Look into a bag, rewrite a damaged one, or inject a known effect.
@@ -202,7 +201,7 @@ fn check_lines(checks: &Checks) -> String {
     let agreeing = checks.checks.iter().filter(|c| c.finding == Finding::Agrees).count();
     let _ = writeln!(text, "  {agreeing} of {} comparisons of signals agree", checks.checks.len());
     for check in checks.disagreeing() {
-        let _ = writeln!(text, "  {}", disagreement(check));
+        let _ = writeln!(text, "  {check}");
     }
     for u in &checks.unchecked {
         let _ = writeln!(text, "  nothing checks {} of {}; it needs {}", u.property, u.signal, u.needs);

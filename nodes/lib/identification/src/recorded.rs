@@ -177,7 +177,7 @@ impl Usable {
         if objections.is_empty() && !wanted.is_empty() {
             match smooth(&source(&usable.sequence, &checks, &wanted)) {
                 Ok(smoothed) => {
-                    usable.recorded.estimated = Some(fill(&mut usable.sequence, &smoothed, &wanted))
+                    usable.recorded.estimated = Some(fill(&mut usable.sequence, &smoothed, &wanted));
                 }
                 Err(_) => objections.push(Objection::PoorPoses),
             }
@@ -240,7 +240,7 @@ impl Judge<'_> {
         let Some(check) = self.disagrees(Pair::SpeedAndPose) else { return };
         match check.finding {
             Finding::Scale { factor } => {
-                wanted.push(("v_x_mps", Why::Contradicted { pair: check.pair, ratio: factor }))
+                wanted.push(("v_x_mps", Why::Contradicted { pair: check.pair, ratio: factor }));
             }
             _ => self.object(check),
         }

@@ -7,8 +7,8 @@ use std::f64::consts::TAU;
 
 use gripsight_identification::{
     Change, Config, Estimate, FrictionPrior, HorizonError, IterationRecord, Nuisance, Outcome, PeakFriction,
-    PerAxle, ProvisionalSet, Range, Rmse, RmseReport, RunKey, SignalCorrections, SignalEstimates, Source,
-    Status, TireCurve, Trace, ValidWithin, WeakSignal,
+    PerAxle, ProvisionalSet, Range, Recorded, Rmse, RmseReport, RunKey, SignalCorrections, SignalEstimates,
+    Source, Status, TireCurve, Trace, ValidWithin, WeakSignal,
 };
 use gripsight_report::{Header, IdentificationInput, identification_page};
 use gripsight_signals::DataHealth;
@@ -142,6 +142,7 @@ fn outcome() -> Outcome {
         },
         config,
         vehicle: VehicleParameters::f1tenth(),
+        recorded: Recorded::default(),
         trace: Trace {
             v_x_mps: vec![3.0; time_s.len()],
             a_y_mps2: wave(0.31, 4.0),

@@ -87,9 +87,9 @@ impl WindowCutter {
 
     /// Takes a sample; gives the window that it closes.
     pub fn push(&mut self, sample: TelemetrySample) -> Option<StateSequence> {
-        let elapsed_s = self.buffer.first().map_or(0.0, |first| elapsed_s(first, &sample));
-        let full = elapsed_s >= self.config.length_s;
-        let closed = if full { self.rest().ok() } else { self.early(elapsed_s) };
+        let length_s = self.buffer.first().map_or(0.0, |first| elapsed_s(first, &sample));
+        let full = length_s >= self.config.length_s;
+        let closed = if full { self.rest().ok() } else { self.early(length_s) };
         if full {
             self.growth.iter_mut().for_each(|growth| growth.given = None);
             let start = self.buffer[0];
@@ -103,8 +103,8 @@ impl WindowCutter {
     }
 
     /// The first window while it grows, where one is due.
-    fn early(&mut self, elapsed_s: f64) -> Option<StateSequence> {
-        let growth = self.growth.as_mut().filter(|g| g.is_due(elapsed_s, self.config.length_s))?;
+    fn early(&mut self, so_far_s: f64) -> Option<StateSequence> {
+        let growth = self.growth.as_mut().filter(|g| g.is_due(so_far_s, self.config.length_s))?;
         let given = growth.given.unwrap_or(0) + 1;
         growth.given = Some(given);
         let mut sequence = self.rest().ok()?;

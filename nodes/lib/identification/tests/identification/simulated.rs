@@ -254,7 +254,7 @@ fn localised(sequence: &StateSequence) -> StateSequence {
     use rand::SeedableRng;
     use rand_distr::{Distribution, Normal};
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
-    let mut noise = |sigma: f64| Normal::new(0.0, sigma).unwrap().sample(&mut random) as f32;
+    let mut noise = |sigma: f64| Normal::new(0.0, sigma).map_or(0.0, |n| n.sample(&mut random)) as f32;
     let mut s = sequence.clone();
     let [x, y, yaw] = [&mut s.x_m, &mut s.y_m, &mut s.yaw_rad].map(std::mem::take);
     for k in (0..s.len()).step_by(2) {
