@@ -109,6 +109,11 @@ impl Process {
         assert!(status.success(), "cannot signal {}", self.name);
     }
 
+    /// Its number.
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     /// The most memory that the running process has held so far.
     ///
     /// # Panics

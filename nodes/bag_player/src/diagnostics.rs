@@ -59,6 +59,8 @@ pub(crate) fn status(state: &State) -> Status {
 
 #[cfg(test)]
 mod tests {
+    use gripsight_runtime::manual_covers;
+
     use super::*;
 
     #[test]
@@ -70,5 +72,9 @@ mod tests {
         assert_eq!((late.level, late.message.as_str()), (Level::Warn, "cannot keep up with rate 10"));
         let cut = State { stage: Stage::Finished, truncated: Some("cut off at byte 7".into()), ..playing };
         assert!(status(&cut).message.ends_with("cut off at byte 7"));
+        let paused = State { stage: Stage::Paused, ..State::default() };
+        let finished = State { stage: Stage::Finished, ..State::default() };
+        let states = [status(&State::default()), late, status(&cut), status(&paused), status(&finished)];
+        assert_eq!(manual_covers(include_str!("../README.md"), &states), Ok(()));
     }
 }

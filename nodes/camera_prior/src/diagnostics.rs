@@ -66,6 +66,8 @@ pub(crate) fn status(facts: &Facts<'_>) -> Status {
 
 #[cfg(test)]
 mod tests {
+    use gripsight_runtime::manual_covers;
+
     use super::*;
 
     fn estimate(reason: Option<Reason>) -> Estimate {
@@ -87,10 +89,23 @@ mod tests {
     }
 
     #[test]
-    fn each_condition_has_its_level() {
+    fn the_manual_lists_every_state() {
         let (good, dark, failed) =
             (estimate(None), estimate(Some(Reason::Dark)), estimate(Some(Reason::NetworkFailed)));
-        let facts = |last| Facts {
+        let states = [
+            facts(&good),
+            facts(&dark),
+            facts(&failed),
+            Facts { newly_read: 0, ..facts(&good) },
+            Facts { newly_read: 0, configured: true, ..facts(&good) },
+            Facts { odometry: false, ..facts(&good) },
+            Facts { no_network: Some("no library"), ..facts(&good) },
+        ];
+        assert_eq!(manual_covers(include_str!("../README.md"), &states.map(|facts| status(&facts))), Ok(()));
+    }
+
+    fn facts(last: &Estimate) -> Facts<'_> {
+        Facts {
             no_network: None,
             configured: false,
             counts: Counts::default(),
@@ -98,7 +113,13 @@ mod tests {
             last: Some(last),
             odometry: true,
             longest_ms: 2.0,
-        };
+        }
+    }
+
+    #[test]
+    fn each_condition_has_its_level() {
+        let (good, dark, failed) =
+            (estimate(None), estimate(Some(Reason::Dark)), estimate(Some(Reason::NetworkFailed)));
         assert_eq!(status(&facts(&good)).level, Level::Ok);
         assert_eq!(status(&Facts { newly_read: 0, ..facts(&good) }).level, Level::Error);
         assert_eq!(status(&Facts { odometry: false, ..facts(&good) }).level, Level::Warn);

@@ -41,6 +41,9 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
         .then(|| node.subscription::<CompressedImage>("image/compressed", pictures))
         .transpose()?;
     let odometry = node.subscription::<Odometry>("odom", node.sensor_qos(50))?;
+    let pictures_from =
+        raw.iter().map(Subscription::arrivals).chain(compressed.iter().map(Subscription::arrivals));
+    node.needs(pictures_from.collect::<Vec<_>>());
     let region = configuration.publish_region;
     let state = State {
         estimator,

@@ -43,7 +43,7 @@ pub(crate) fn status(facts: &Facts) -> Status {
             let agrees = *verdict == "no_gap";
             (if agrees { Level::Ok } else { Level::Warn }, format!("{verdict}: {because}"))
         }
-        Last::Failed { reason } => (Level::Error, reason.clone()),
+        Last::Failed { reason } => (Level::Error, format!("the last diagnosis could not be made: {reason}")),
     };
     Status::new(level, text)
         .value("diagnoses", facts.diagnoses)
@@ -54,15 +54,22 @@ pub(crate) fn status(facts: &Facts) -> Status {
 
 #[cfg(test)]
 mod tests {
+    use gripsight_runtime::manual_covers;
+
     use super::*;
 
     #[test]
     fn each_end_has_its_level() {
-        let level =
-            |last| status(&Facts { last, diagnoses: 1, received: 0, took_s: 1.0, has_tires: false }).level;
+        let of = |last| status(&Facts { last, diagnoses: 1, received: 0, took_s: 1.0, has_tires: false });
+        let level = |last| of(last).level;
         assert_eq!(level(Last::None), Level::Ok);
         assert_eq!(level(Last::Done { verdict: "no_gap", because: String::new() }), Level::Ok);
         assert_eq!(level(Last::Done { verdict: "effects", because: String::new() }), Level::Warn);
         assert_eq!(level(Last::Failed { reason: "r".into() }), Level::Error);
+        let verdicts = ["no_gap", "effects", "tire_retune_only", "none_of_these", "not_identifiable"];
+        let mut states = verdicts.map(|verdict| of(Last::Done { verdict, because: "b".into() })).to_vec();
+        states.push(of(Last::None));
+        states.push(of(Last::Failed { reason: "r".into() }));
+        assert_eq!(manual_covers(include_str!("../README.md"), &states), Ok(()));
     }
 }

@@ -50,7 +50,7 @@ pub(crate) fn status(facts: &Facts) -> Status {
         LastRun::Accepted { remarks } if remarks.is_empty() => (Level::Ok, "tires accepted".to_owned()),
         LastRun::Accepted { remarks } => (Level::Ok, format!("tires accepted; {remarks}")),
         LastRun::Rejected { reason } => (Level::Warn, format!("tires rejected: {reason}")),
-        LastRun::Failed { reason } => (Level::Error, reason.clone()),
+        LastRun::Failed { reason } => (Level::Error, format!("the last run gave no set: {reason}")),
     };
     let text = match &facts.running {
         Some(running) if facts.last == LastRun::None => running.clone(),
@@ -68,6 +68,8 @@ pub(crate) fn status(facts: &Facts) -> Status {
 
 #[cfg(test)]
 mod tests {
+    use gripsight_runtime::manual_covers;
+
     use super::*;
 
     #[test]
@@ -88,5 +90,14 @@ mod tests {
         assert_eq!(of(LastRun::Accepted { remarks: String::new() }).level, Level::Ok);
         assert_eq!(of(LastRun::Rejected { reason: "r".into() }).level, Level::Warn);
         assert_eq!(of(LastRun::Failed { reason: "r".into() }).level, Level::Error);
+        let reason = || "r".to_owned();
+        let states = [
+            LastRun::None,
+            LastRun::Accepted { remarks: String::new() },
+            LastRun::Accepted { remarks: reason() },
+            LastRun::Rejected { reason: reason() },
+            LastRun::Failed { reason: reason() },
+        ];
+        assert_eq!(manual_covers(include_str!("../README.md"), &states.map(of)), Ok(()));
     }
 }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use gripsight_identification::{
     AcceptedSet, Candidate, Config, FrictionPrior, Identification, IdentificationError, IterationRecord,
-    Next, Outcome, ResidualModel, RunKey, Started,
+    Method, Next, Outcome, ResidualModel, RunKey, Started,
 };
 use gripsight_identification_messages as messages;
 use gripsight_msgs::{IdentificationProgress as Progress, ResidualModel as ModelMessage};
@@ -27,6 +27,10 @@ pub(crate) enum RunError {
         "no residual model for {key} within {waited_s:.0} s: is s4_residual running, with the same vehicle file?"
     )]
     NoAnswer { key: Box<RunKey>, waited_s: f64 },
+    #[error(
+        "s4_residual learns by the method {theirs}, this node finds tires by {own}: give both nodes the same `method`"
+    )]
+    OtherMethod { theirs: &'static str, own: &'static str },
     #[error("the computation ended abnormally: {0}")]
     Computation(#[from] tokio::task::JoinError),
     #[error("the node is shutting down")]
@@ -118,7 +122,9 @@ impl Run<'_> {
                     let message = message.ok_or(RunError::ShuttingDown)?;
                     // Late and repeated answers, and those to others, are no news.
                     if messages::run_key(&message.handshake) == candidate.key {
-                        return Ok(messages::learned_model(&message)?);
+                        let model = messages::learned_model(&message)?;
+                        of_method(model.horizon, self.config.method)?;
+                        return Ok(model);
                     }
                 }
                 () = &mut deadline => {
@@ -133,5 +139,25 @@ impl Run<'_> {
         (self.on_step)(&text);
         let (sequence, config, elapsed) = (&*self.sequence, &self.config, self.start.elapsed());
         self.outputs.progress(&Step { key, sequence, config, stage, last, elapsed, text }).await;
+    }
+}
+
+/// Refuses a model that was learned by another method than it is to be used by: the paper's takes residuals one step ahead, the robust one
+/// over several.
+fn of_method(horizon: usize, own: Method) -> Result<(), RunError> {
+    let name = |method| if method == Method::Paper { "paper" } else { "robust" };
+    let theirs = if horizon == 1 { Method::Paper } else { Method::Robust };
+    if theirs == own { Ok(()) } else { Err(RunError::OtherMethod { theirs: name(theirs), own: name(own) }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_model_of_another_method_is_refused_with_both_names() {
+        assert!(of_method(1, Method::Paper).is_ok() && of_method(10, Method::Robust).is_ok());
+        let refused = of_method(1, Method::Robust).unwrap_err().to_string();
+        assert!(refused.contains("method paper") && refused.contains("by robust"), "{refused}");
     }
 }

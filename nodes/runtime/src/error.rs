@@ -17,6 +17,13 @@ pub enum Error {
         /// What would be right.
         expected: &'static str,
     },
+    /// The environment demands security (SROS 2), which this suite does not have.
+    #[error(
+        "ROS_SECURITY_ENABLE=true with ROS_SECURITY_STRATEGY=Enforce: this node cannot authenticate or encrypt (its DDS, RustDDS, is \
+         built without DDS Security), and does not run open where security is enforced. Set ROS_SECURITY_STRATEGY=Permissive to let it \
+         run open, or keep strangers out by a ROS_DOMAIN_ID of its own and ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST"
+    )]
+    Security,
     /// A parameter file could not be read.
     #[error("parameter file {path}: {reason}")]
     ParameterFile {

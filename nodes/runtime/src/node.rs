@@ -2,16 +2,16 @@
 
 use std::future::Future;
 use std::marker::PhantomData;
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use gripsight_msgs::Message;
 use gripsight_msgs::standard::diagnostic_msgs::DiagnosticArray;
-use gripsight_msgs::standard::rcl_interfaces::{Log, ParameterEvent};
+use gripsight_msgs::standard::rcl_interfaces::Log;
 use gripsight_msgs::standard::rosgraph_msgs::Clock as ClockMessage;
 use gripsight_msgs::standard::std_msgs::Header;
-use ros2_client::{Context, MessageTypeName, Name, NodeName, NodeOptions, ros2};
-use rustdds::DomainParticipantBuilder;
+use ros2_client::Context;
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
 
@@ -20,21 +20,23 @@ use crate::clock::Clock;
 use crate::diagnostics::Diagnostics;
 use crate::environment::{self, Environment};
 use crate::error::Error;
+use crate::ground::{context, overrides, ros_node, ros_topic, stopped};
+use crate::guard::Guard;
+use crate::inputs::{self, Arrivals};
 use crate::logging;
 use crate::names::Identity;
-use crate::parameter_file::parameters_for;
 use crate::parameter_services::ParameterServices;
 use crate::parameters::{Descriptor, Parameter, ParameterStore};
-use crate::publisher::{Publisher, RawCdr, RawPublisher};
+use crate::publisher::{PATIENCE, Publisher, REPLAY_PATIENCE, RawCdr, RawPublisher};
 use crate::qos::Qos;
 use crate::subscription::{Subscription, forward};
 use crate::value::{ParameterType, ParameterValue};
 
 /// Time that the node's own tasks have to end.
-const SHUTDOWN_TIME: Duration = Duration::from_secs(2);
+const SHUTDOWN_TIME: Duration = Duration::from_millis(500);
 
-/// DDS is looked after this often.
-const WATCH_PERIOD: Duration = Duration::from_secs(1);
+/// Changes of parameters that wait for `/parameter_events`; more are lost there.
+const WAITING_CHANGES: usize = 1000;
 
 /// Why a node no longer runs.
 pub(crate) enum Ended<E> {
@@ -56,11 +58,18 @@ pub struct Node {
     // Dropped in this order: the node, which ends its spinner, then the context.
     ros: Arc<Mutex<ros2_client::Node>>,
     context: Context,
+    domain_id: u16,
+    /// Parameters that `/parameter_events` is to be told of.
+    changes: Option<mpsc::Sender<(String, ParameterValue)>>,
 }
 
 impl Node {
     /// Starts the node that its program calls `name`, as the command line and the environment say.
-    pub(crate) fn start(name: &str, arguments: impl IntoIterator<Item = String>) -> Result<Self, Error> {
+    pub(crate) fn start(
+        name: &str,
+        arguments: impl IntoIterator<Item = String>,
+        guard: &Guard,
+    ) -> Result<Self, Error> {
         let args = Args::parse(arguments)?;
         let variable = |name: &str| std::env::var(name).ok();
         let environment = Environment::read(variable)?;
@@ -81,6 +90,10 @@ impl Node {
                 .read_only(),
         )?;
 
+        let memory_limit = Guard::limit(&parameters)?;
+        let diagnostics = Diagnostics::default();
+        guard.watch(diagnostics.clone(), memory_limit);
+
         let context = context(&environment)?;
         let mut ros = ros_node(&context, &identity)?;
         let spinner = ros.spinner().map_err(|error| Error::create("spinner", error))?;
@@ -89,11 +102,13 @@ impl Node {
             identity,
             parameters,
             reliable_inputs,
-            diagnostics: Diagnostics::default(),
+            diagnostics,
             tasks: JoinSet::new(),
             stop: watch::Sender::new(false),
             ros: Arc::new(Mutex::new(ros)),
             context,
+            domain_id: environment.domain_id,
+            changes: None,
         };
         tokio::spawn(async move {
             if let Err(error) = spinner.spin().await {
@@ -137,6 +152,16 @@ impl Node {
         self.parameters.declare(name, default, descriptor)
     }
 
+    /// Looks for values given to parameters that the node does not have, and tells `/parameter_events` of those that it has; to be
+    /// called once it has declared all.
+    pub(crate) fn check_parameters(&self) -> Result<(), Error> {
+        self.parameters.undeclared()?.into_iter().for_each(|sentence| tracing::warn!("{sentence}"));
+        if let Some(changes) = &self.changes {
+            self.parameters.values().into_iter().for_each(|change| drop(changes.try_send(change)));
+        }
+        Ok(())
+    }
+
     /// Quality of service of a sensor input: best effort with this depth, or that of a replay when
     /// the parameter `reliable_inputs` is true.
     pub fn sensor_qos(&self, depth: usize) -> Qos {
@@ -148,7 +173,8 @@ impl Node {
     /// # Errors
     /// [`Error::Name`], or [`Error::Create`] when DDS refuses.
     pub fn publisher<M: Message>(&mut self, topic: &str, qos: Qos) -> Result<Publisher<M>, Error> {
-        Ok(Publisher { raw: self.raw_publisher(topic, M::TYPE, qos)?, kind: PhantomData })
+        let raw = RawPublisher { patience: PATIENCE, ..self.raw_publisher(topic, M::TYPE, qos)? };
+        Ok(Publisher { raw, kind: PhantomData })
     }
 
     /// Publishes serialized messages of the type `type_name` (`package/msg/Type`) on a topic.
@@ -162,7 +188,8 @@ impl Node {
             .and_then(|dds| ros.create_publisher::<RawCdr>(&dds, Some(qos.profile())))
             .map_err(|error| Error::create(format!("publisher of {topic}"), error))?;
         let (node, diagnostics) = (Arc::downgrade(&self.ros), self.diagnostics.clone());
-        Ok(RawPublisher { topic, writer, node, diagnostics })
+        let is_full = AtomicBool::new(false);
+        Ok(RawPublisher { topic, writer, node, diagnostics, patience: REPLAY_PATIENCE, is_full })
     }
 
     /// Subscribes to messages of type `M` on a topic (relative, `~/` private, or absolute).
@@ -177,9 +204,20 @@ impl Node {
             .map_err(|error| Error::create(format!("subscription to {topic}"), error))?;
         drop(ros);
         let (sender, messages) = mpsc::channel(qos.depth());
-        let diagnostics = self.diagnostics.clone();
-        self.tasks.spawn(forward(reader, topic.clone(), sender, diagnostics, self.stop.subscribe()));
-        Ok(Subscription { topic, messages })
+        let (diagnostics, stop) = (self.diagnostics.clone(), self.stop.subscribe());
+        let arrivals = Arrivals::new(topic.clone(), M::TYPE, qos);
+        self.tasks.spawn(forward(reader, topic.clone(), arrivals.clone(), sender, diagnostics, stop));
+        Ok(Subscription { topic, messages, arrivals })
+    }
+
+    /// States that the node can do nothing without messages on one of these topics. Where none has come for five seconds a line in the
+    /// log, and a part of the diagnostics, name the topics, the quality of service asked for, and who publishes there.
+    pub fn needs(&mut self, one_of: impl IntoIterator<Item = Arrivals>) {
+        let needed: Vec<Arrivals> = one_of.into_iter().collect();
+        if !needed.is_empty() {
+            let participant = self.context.domain_participant();
+            self.spawn(inputs::watch(needed, participant, self.domain_id, self.diagnostics.clone()));
+        }
     }
 
     /// Runs `work` until it ends, `end` resolves or DDS has stopped, then stops the node's own tasks in order.
@@ -257,84 +295,35 @@ impl Node {
     }
 
     fn serve_parameters(&mut self, environment: &Environment) -> Result<(), Error> {
-        let publisher = self.publisher::<ParameterEvent>("/parameter_events", Qos::reliable(1000))?;
-        let (events, mut waiting) = mpsc::channel(1000);
-        let services = ParameterServices {
-            store: Arc::clone(&self.parameters),
-            events,
-            clock: self.clock.clone(),
-            node: self.name(),
-        };
-        let serving = {
-            let mut ros = self.ros.lock().unwrap_or_else(PoisonError::into_inner);
-            let participant = self.context.domain_participant();
-            services.serve(&mut ros, &self.identity, environment.service_mapping, &participant)?
-        };
-        self.spawn(serving);
-        self.spawn(async move {
-            while let Some(event) = waiting.recv().await {
-                publisher.publish(&event).await;
-            }
-        });
+        let (changes, waiting) = mpsc::channel(WAITING_CHANGES);
+        self.changes = Some(changes.clone());
+        let services = ParameterServices { store: Arc::clone(&self.parameters), changes };
+        let participant = self.context.domain_participant();
+        for mapping in &environment.service_mappings {
+            let serving = {
+                let mut ros = self.ros.lock().unwrap_or_else(PoisonError::into_inner);
+                services.clone().serve(&mut ros, &self.identity, *mapping, &participant)?
+            };
+            self.spawn(serving);
+        }
+        self.tell_changes(waiting);
         Ok(())
     }
-}
 
-/// Resolves once DDS no longer runs. RustDDS 0.15.1 ends its threads where a system call is interrupted, which happens to a process
-/// that was stopped and goes on: after Ctrl-Z and `fg`, beneath a debugger. Only a command that nobody takes any more shows it.
-async fn stopped(participant: rustdds::DomainParticipant) {
-    let mut looks = tokio::time::interval(WATCH_PERIOD);
-    while participant.assert_liveliness().is_ok() {
-        looks.tick().await;
+    /// `/parameter_events`: ros2-client publishes there whatever is set in its own store, which is kept in step for that alone; a second
+    /// publisher of this crate's would be one too many. It stamps with `/clock` of another type where its store says `use_sim_time`, so
+    /// that parameter stays out.
+    fn tell_changes(&mut self, mut waiting: mpsc::Receiver<(String, ParameterValue)>) {
+        let ros = Arc::downgrade(&self.ros);
+        self.spawn(async move {
+            while let Some((name, value)) = waiting.recv().await {
+                let Some(ros) = ros.upgrade() else { return };
+                if name != "use_sim_time" {
+                    let ros = ros.lock().unwrap_or_else(PoisonError::into_inner);
+                    // Nothing is refused: the store allows any parameter, and has no rules.
+                    ros.set_parameter(&name, value.into()).ok();
+                }
+            }
+        });
     }
-}
-
-/// Parameters from the files, then those of the command line, which win.
-fn overrides(args: &Args, name: &str, identity: &Identity) -> Result<Vec<(String, ParameterValue)>, Error> {
-    let full_name = identity.fully_qualified();
-    let mut found = Vec::new();
-    for path in &args.parameter_files {
-        let of_file = |reason: String| Error::ParameterFile { path: path.clone(), reason };
-        let text = std::fs::read_to_string(path).map_err(|error| of_file(error.to_string()))?;
-        found.extend(parameters_for(&text, &full_name).map_err(of_file)?);
-    }
-    let is_ours = |node: &str| node == name || node == identity.name || node == full_name;
-    for given in args.parameters.iter().filter(|given| given.node.as_deref().is_none_or(is_ours)) {
-        let value =
-            ParameterValue::parse(&given.value).map_err(|reason| Error::parameter(&given.name, reason))?;
-        found.push((given.name.clone(), value));
-    }
-    Ok(found)
-}
-
-fn context(environment: &Environment) -> Result<Context, Error> {
-    let mut builder = DomainParticipantBuilder::new(environment.domain_id);
-    if environment.localhost_only {
-        builder = builder.with_only_networks([std::net::Ipv4Addr::LOCALHOST]);
-    }
-    let participant = builder.build().map_err(|error| Error::create("DDS participant", error))?;
-    Context::from_domain_participant(participant).map_err(|error| Error::create("ROS 2 context", error))
-}
-
-/// The ros2-client node, without the services that this crate supplies itself.
-fn ros_node(context: &Context, identity: &Identity) -> Result<ros2_client::Node, Error> {
-    let full_name = identity.fully_qualified();
-    let name = NodeName::new(&identity.namespace, &identity.name)
-        .map_err(|error| Error::Name { name: full_name.clone(), reason: error.to_string() })?;
-    let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
-    context.new_node(name, options).map_err(|error| Error::create(format!("node {full_name}"), error))
-}
-
-fn ros_topic(
-    node: &ros2_client::Node,
-    topic: &str,
-    type_name: &str,
-    qos: Qos,
-) -> Result<rustdds::Topic, ros2::CreateError> {
-    let wrong = |reason: String| ros2::CreateError::BadParameter { reason };
-    let name = Name::parse(topic).map_err(|error| wrong(error.to_string()))?;
-    let (package, type_name) = type_name
-        .split_once("/msg/")
-        .ok_or_else(|| wrong(format!("`{type_name}` is not of the form package/msg/Type")))?;
-    node.create_topic(&name, MessageTypeName::new(package, type_name), &qos.profile())
 }

@@ -4,35 +4,46 @@
 //! (`car: {telemetry: ...}`) selects nodes: `*` stands for one token of a full name, `**` for any
 //! number. All that select a node count, in the order of the file; the last value wins.
 
+use crate::parameters::{Given, Origin};
 use crate::value::ParameterValue;
-use crate::yaml::{self, Yaml};
+use crate::yaml::{self, Entry, Yaml};
 
 const PARAMETERS: &str = "ros__parameters";
 
-/// The parameters that a file (its text) holds for the node with the full name `node`, with
+/// The parameters that a file (its path and text) holds for the node with the full name `node`, with
 /// nested names joined by dots. The error is a sentence.
-pub(crate) fn parameters_for(text: &str, node: &str) -> Result<Vec<(String, ParameterValue)>, String> {
+pub(crate) fn parameters_for(path: &str, text: &str, node: &str) -> Result<Vec<Given>, String> {
     let document = yaml::parse(text)?;
     let tokens: Vec<&str> = tokens(node).collect();
-    let mut found = Vec::new();
+    let mut found = Found { path, given: Vec::new() };
     select(&document, &mut Vec::new(), &tokens, &mut found)?;
-    Ok(found)
+    Ok(found.given)
 }
 
-type Found = Vec<(String, ParameterValue)>;
+struct Found<'a> {
+    path: &'a str,
+    given: Vec<Given>,
+}
 
 fn tokens(name: &str) -> impl Iterator<Item = &str> {
     name.split('/').filter(|token| !token.is_empty())
 }
 
-fn select(yaml: &Yaml, pattern: &mut Vec<String>, node: &[&str], found: &mut Found) -> Result<(), String> {
+fn select(
+    yaml: &Yaml,
+    pattern: &mut Vec<String>,
+    node: &[&str],
+    found: &mut Found<'_>,
+) -> Result<(), String> {
     let Yaml::Mapping(entries) = yaml else {
         return Err(format!("expected a mapping with `{PARAMETERS}` under `{}`", pattern.join("/")));
     };
-    for (key, value) in entries {
+    for Entry { key, value, line } in entries {
         if key == PARAMETERS {
             if matches(pattern, node) {
-                flatten(value, "", found)?;
+                // A section that ends in a wildcard is for other nodes, too.
+                let is_own = pattern.last().is_some_and(|token| !token.starts_with('*'));
+                flatten(value, "", *line, is_own, found)?;
             }
             continue;
         }
@@ -55,16 +66,18 @@ fn matches<S: AsRef<str>>(pattern: &[S], node: &[&str]) -> bool {
     }
 }
 
-fn flatten(yaml: &Yaml, prefix: &str, found: &mut Found) -> Result<(), String> {
+fn flatten(yaml: &Yaml, prefix: &str, line: u64, is_own: bool, found: &mut Found<'_>) -> Result<(), String> {
     match yaml {
-        Yaml::Mapping(entries) => entries.iter().try_for_each(|(key, value)| {
+        Yaml::Mapping(entries) => entries.iter().try_for_each(|Entry { key, value, line }| {
             let name = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
-            flatten(value, &name, found)
+            flatten(value, &name, *line, is_own, found)
         }),
         Yaml::Null if prefix.is_empty() => Ok(()),
         value => {
-            let value = ParameterValue::from_yaml(value).map_err(|reason| format!("{prefix}: {reason}"))?;
-            found.push((prefix.to_owned(), value));
+            let value = ParameterValue::from_yaml(value)
+                .map_err(|reason| format!("line {line}: {prefix}: {reason}"))?;
+            let origin = Origin { place: format!("{}, line {line}", found.path), is_own };
+            found.given.push(Given { name: prefix.to_owned(), value, origin });
             Ok(())
         }
     }
@@ -92,7 +105,21 @@ car:
 ";
 
     fn last(node: &str, name: &str) -> Option<ParameterValue> {
-        parameters_for(FILE, node).unwrap().into_iter().rfind(|(key, _)| key == name).map(|(_, value)| value)
+        given(node, name).map(|given| given.value)
+    }
+
+    fn given(node: &str, name: &str) -> Option<Given> {
+        parameters_for("a.yaml", FILE, node).unwrap().into_iter().rfind(|given| given.name == name)
+    }
+
+    #[test]
+    fn places_and_owners_are_kept() {
+        let origin = |node: &str, name: &str| given(node, name).map(|given| given.origin).unwrap();
+        let at = |place: &str, is_own| Origin { place: place.to_owned(), is_own };
+        assert_eq!(origin("/x", "rate"), at("a.yaml, line 4", false));
+        assert_eq!(origin("/x", "vehicle.mass_kg"), at("a.yaml, line 5", false));
+        assert_eq!(origin("/telemetry", "rate"), at("a.yaml, line 8", true));
+        assert_eq!(origin("/car/telemetry", "wild"), at("a.yaml, line 15", true));
     }
 
     #[test]
@@ -114,8 +141,9 @@ car:
 
     #[test]
     fn what_is_wrong_is_named() {
-        assert!(parameters_for("/**: {ros__parameters: {a: [1, x]}}", "/x").unwrap_err().starts_with("a:"));
-        assert!(parameters_for("/**: 3", "/x").unwrap_err().contains("ros__parameters"));
-        assert!(parameters_for("a: [", "/x").is_err());
+        let wrong = |text: &str| parameters_for("a.yaml", text, "/x").unwrap_err();
+        assert!(wrong("/**: {ros__parameters: {a: [1, x]}}").starts_with("line 1: a:"));
+        assert!(wrong("/**: 3").contains("ros__parameters"));
+        assert!(!wrong("a: [").is_empty());
     }
 }

@@ -1,6 +1,7 @@
-//! The six services by which `ros2 param` reads and sets a node's parameters, and `/parameter_events`.
+//! The six services by which `ros2 param` reads and sets a node's parameters.
 //!
-//! ros2-client's own services know one mapping of services to DDS only, and no descriptors.
+//! ros2-client's own services know one mapping of services to DDS only, and no descriptors. A request does not say by which mapping it
+//! was made; the vendor at the front of its writer's GUID does (RTPS 2.5, 9.3.1.5).
 
 use std::collections::BTreeSet;
 use std::future::Future;
@@ -15,15 +16,17 @@ use serde::{Deserialize, Serialize};
 use tokio::sync::mpsc;
 
 use crate::Error;
-use crate::clock::Clock;
 use crate::names::Identity;
 use crate::parameters::ParameterStore;
 use crate::qos::Qos;
+use crate::value::ParameterValue;
 
 /// Time that a client's reader of replies has to be discovered.
 const DISCOVERY_TIME: Duration = Duration::from_secs(1);
 /// Bytes of a client's GUID that both mappings of services leave as they are; they tell participants apart.
 const KNOWN_OF_CLIENT: usize = 8;
+/// Vendor id of Eclipse CycloneDDS, as the OMG assigned it (<https://www.dds-foundation.org/dds-rtps-vendor-and-product-ids/>).
+const CYCLONE_DDS: [u8; 2] = [0x01, 0x10];
 
 macro_rules! service_messages {
     ($($name:ident { $($field:ident: $type:ty),* })*) => {$(
@@ -50,10 +53,7 @@ service_messages! {
 pub(crate) struct ParameterServices {
     pub(crate) store: Arc<ParameterStore>,
     /// Changes, for `/parameter_events`.
-    pub(crate) events: mpsc::Sender<rcl::ParameterEvent>,
-    pub(crate) clock: Clock,
-    /// Full name of the node.
-    pub(crate) node: String,
+    pub(crate) changes: mpsc::Sender<(String, ParameterValue)>,
 }
 
 impl ParameterServices {
@@ -119,16 +119,10 @@ impl ParameterServices {
     }
 
     fn set(&self, parameters: Vec<rcl::Parameter>) -> rcl::SetParametersResult {
-        let event = rcl::ParameterEvent {
-            stamp: self.clock.now(),
-            node: self.node.clone(),
-            changed_parameters: parameters.clone(),
-            ..Default::default()
-        };
         match self.store.set(parameters) {
-            Ok(()) => {
+            Ok(changed) => {
                 // A full queue loses the event; the parameter is set all the same.
-                self.events.try_send(event).ok();
+                changed.into_iter().for_each(|change| drop(self.changes.try_send(change)));
                 rcl::SetParametersResult { successful: true, reason: String::new() }
             }
             Err(reason) => {
@@ -178,7 +172,8 @@ impl Factory<'_> {
             .create_server(self.mapping, &ros_name, &type_name, qos.clone(), qos)
             .map_err(|error| Error::create(format!("service {name}"), error))?;
         let participant = self.participant.clone();
-        Ok(Service { server, replies: Replies { participant, topic: format!("rr{name}Reply") } })
+        let replies = Replies { participant, topic: format!("rr{name}Reply") };
+        Ok(Service { server, replies, mapping: self.mapping })
     }
 }
 
@@ -189,6 +184,12 @@ where
 {
     server: Server<Q, A>,
     replies: Replies,
+    mapping: ServiceMapping,
+}
+
+/// Whether a client asks by this mapping; the other's server answers the others.
+fn asks_by(mapping: ServiceMapping, client: &RmwRequestId) -> bool {
+    (mapping == ServiceMapping::Cyclone) == client.writer_gid.as_bytes().starts_with(&CYCLONE_DDS)
 }
 
 /// The topic on which a service replies, by its DDS name.
@@ -221,10 +222,11 @@ where
     Q: Message + 'static,
     A: Message + 'static,
 {
-    let Service { server, replies } = service;
+    let Service { server, replies, mapping } = service;
     let mut requests = server.receive_request_stream();
     while let Some(request) = requests.next().await {
         match request {
+            Ok((id, _)) if !asks_by(mapping, &id) => {}
             Ok((id, request)) => {
                 let response = respond(request);
                 replies.are_read_by(&id).await;
@@ -232,7 +234,8 @@ where
                     tracing::warn!("cannot answer a parameter request: {error}");
                 }
             }
-            Err(error) => tracing::warn!("cannot read a parameter request: {error}"),
+            // As a rule one that was made by the other mapping.
+            Err(error) => tracing::debug!("cannot read a parameter request: {error}"),
         }
     }
 }

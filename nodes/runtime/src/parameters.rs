@@ -69,6 +69,23 @@ impl Descriptor {
     }
 }
 
+/// A value that a file or the command line gives a parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Given {
+    pub(crate) name: String,
+    pub(crate) value: ParameterValue,
+    pub(crate) origin: Origin,
+}
+
+/// Where a value was given.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Origin {
+    /// In words.
+    pub(crate) place: String,
+    /// For this node alone, by its name.
+    pub(crate) is_own: bool,
+}
+
 #[derive(Clone, Debug)]
 struct Declared {
     value: ParameterValue,
@@ -79,15 +96,41 @@ struct Declared {
 #[derive(Debug)]
 pub(crate) struct ParameterStore {
     /// Values from files and the command line by name, for parameters declared or not.
-    overrides: BTreeMap<String, ParameterValue>,
+    overrides: BTreeMap<String, Given>,
     declared: Mutex<BTreeMap<String, Declared>>,
 }
 
 impl ParameterStore {
     /// A store whose parameters start at `overrides` where those name them; of several of one
     /// name the last counts.
-    pub(crate) fn new(overrides: impl IntoIterator<Item = (String, ParameterValue)>) -> Self {
-        Self { overrides: overrides.into_iter().collect(), declared: Mutex::default() }
+    pub(crate) fn new(overrides: impl IntoIterator<Item = Given>) -> Self {
+        let overrides = overrides.into_iter().map(|given| (given.name.clone(), given)).collect();
+        Self { overrides, declared: Mutex::default() }
+    }
+
+    /// Looks for values given to parameters that the node does not have, once it has declared all. Where the value is for this node
+    /// alone that is an error; where others share it, a sentence each, unless it belongs to a block (`vehicle.`) of which the node has
+    /// nothing.
+    pub(crate) fn undeclared(&self) -> Result<Vec<String>, Error> {
+        let declared = self.declared();
+        let block = |name: &str| name.split_once('.').map(|(block, _)| format!("{block}."));
+        let is_others = |name: &str| {
+            block(name).is_some_and(|block| declared.keys().all(|declared| !declared.starts_with(&block)))
+        };
+        let names = declared.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+        let mut sentences = Vec::new();
+        for Given { name, origin, .. } in
+            self.overrides.values().filter(|given| !declared.contains_key(&given.name))
+        {
+            if origin.is_own {
+                let reason = format!("{}: this node has no such parameter; it has {names}", origin.place);
+                return Err(Error::parameter(name, reason));
+            }
+            if !is_others(name) {
+                sentences.push(format!("parameter {name} ({}) is none of this node's", origin.place));
+            }
+        }
+        Ok(sentences)
     }
 
     fn declared(&self) -> MutexGuard<'_, BTreeMap<String, Declared>> {
@@ -108,11 +151,17 @@ impl ParameterStore {
         let default_value = default.clone().into_value();
         let value = match self.overrides.get(name) {
             None => default_value,
-            Some(given) => given.clone().converted_to(&default_value).ok_or_else(|| {
-                Error::parameter(name, wrong_type(default_value.type_name(), given.type_name()))
-            })?,
+            Some(Given { value: given, origin, .. }) => {
+                given.clone().converted_to(&default_value).ok_or_else(|| {
+                    let reason = wrong_type(default_value.type_name(), given.type_name());
+                    Error::parameter(name, format!("{reason} ({})", origin.place))
+                })?
+            }
         };
-        descriptor.check(&value).map_err(|reason| Error::parameter(name, reason))?;
+        descriptor.check(&value).map_err(|reason| match self.overrides.get(name) {
+            Some(given) => Error::parameter(name, format!("{reason} ({})", given.origin.place)),
+            None => Error::parameter(name, reason),
+        })?;
         let mut declared = self.declared();
         if declared.contains_key(name) {
             return Err(Error::parameter(name, "declared twice"));
@@ -129,8 +178,16 @@ impl ParameterStore {
         self.declared().keys().cloned().collect()
     }
 
-    /// Sets all of `parameters`, or none when one is refused; the error says which and why.
-    pub(crate) fn set(&self, parameters: Vec<rcl::Parameter>) -> Result<(), String> {
+    /// All values, by name.
+    pub(crate) fn values(&self) -> Vec<(String, ParameterValue)> {
+        self.declared().iter().map(|(name, declared)| (name.clone(), declared.value.clone())).collect()
+    }
+
+    /// Sets all of `parameters`, or none when one is refused; gives them as they now are. The error says which and why.
+    pub(crate) fn set(
+        &self,
+        parameters: Vec<rcl::Parameter>,
+    ) -> Result<Vec<(String, ParameterValue)>, String> {
         let mut declared = self.declared();
         let mut changed = Vec::with_capacity(parameters.len());
         for parameter in parameters {
@@ -138,12 +195,12 @@ impl ParameterStore {
                 .map_err(|reason| format!("parameter {}: {reason}", parameter.name))?;
             changed.push((parameter.name, value));
         }
-        for (name, value) in changed {
-            if let Some(parameter) = declared.get_mut(&name) {
-                parameter.value = value;
+        for (name, value) in &changed {
+            if let Some(parameter) = declared.get_mut(name) {
+                parameter.value = value.clone();
             }
         }
-        Ok(())
+        Ok(changed)
     }
 
     pub(crate) fn descriptor(&self, name: &str) -> Option<rcl::ParameterDescriptor> {
@@ -227,8 +284,28 @@ mod tests {
 
     fn store() -> Arc<ParameterStore> {
         let overrides = [("rate", "1"), ("rate", "2"), ("foreign", "x"), ("words", "[]")]
-            .map(|(name, text)| (name.to_owned(), ParameterValue::parse(text).unwrap()));
+            .map(|(name, text)| given(name, text, false));
         Arc::new(ParameterStore::new(overrides))
+    }
+
+    fn given(name: &str, text: &str, is_own: bool) -> Given {
+        let origin = Origin { place: "a.yaml, line 3".to_owned(), is_own };
+        Given { name: name.to_owned(), value: ParameterValue::parse(text).unwrap(), origin }
+    }
+
+    #[test]
+    fn values_for_parameters_that_the_node_does_not_have_are_told() {
+        let undeclared = |given: &[Given]| {
+            let store = Arc::new(ParameterStore::new(given.to_vec()));
+            store.declare("rate", 1.0, Descriptor::new("")).unwrap();
+            store.declare("sensor.delay_s", 1.0, Descriptor::new("")).unwrap();
+            store.undeclared().map_err(|error| error.to_string())
+        };
+        assert_eq!(undeclared(&[given("rate", "2", true), given("vehicle.mass_kg", "3", false)]), Ok(vec![]));
+        let shared = undeclared(&[given("rte", "2", false), given("sensor.delay", "3", false)]).unwrap();
+        assert_eq!(shared.len(), 2, "{shared:?}");
+        let own = undeclared(&[given("rte", "2", true)]).unwrap_err();
+        assert!(own.starts_with("parameter rte: a.yaml, line 3: ") && own.contains("rate"), "{own}");
     }
 
     fn message(name: &str, value: impl ParameterType) -> rcl::Parameter {
@@ -267,7 +344,9 @@ mod tests {
         let store = store();
         let rate = store.declare("rate", 0.5, Descriptor::new("").range(0.0..=10.0)).unwrap();
         let name = store.declare("name", String::from("a"), Descriptor::new("").read_only()).unwrap();
-        store.set(vec![message("rate", 3_i64)]).unwrap();
+        let set = store.set(vec![message("rate", 3_i64)]).unwrap();
+        // A double is a double, whoever set it with a whole number.
+        assert_eq!(set, [("rate".to_owned(), ParameterValue::Double(3.0))]);
         assert_eq!(rate.get(), 3.0);
         for (bad, part) in [
             (message("rate", 11.0), "0 to 10"),

@@ -5,13 +5,23 @@
 //! Zero bytes after the message, which readers ignore, make the length a multiple of 4.
 
 use std::marker::PhantomData;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError, Weak};
+use std::time::Duration;
 
 use byteorder::LittleEndian;
 use gripsight_msgs::Message;
 use serde::ser::{Serialize, SerializeTuple, Serializer};
 
 use crate::diagnostics::Diagnostics;
+
+/// A message waits this long for room; RustDDS 0.15.1 looks at its own limit only when there is room.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(1);
+/// And a bag's message, of which none shall be lost: longer than it takes to notice that a reader has died (20 s with Fast DDS).
+pub(crate) const REPLAY_PATIENCE: Duration = Duration::from_secs(30);
+/// Where the last message waited in vain the next one waits so much less: a reader that never makes room shall not slow the loop message by
+/// message.
+const IMPATIENT: u32 = 100;
 
 /// A message's CDR body, as it goes on the wire.
 #[derive(Clone)]
@@ -39,6 +49,9 @@ pub struct RawPublisher {
     pub(crate) writer: ros2_client::Publisher<RawCdr>,
     pub(crate) node: Weak<Mutex<ros2_client::Node>>,
     pub(crate) diagnostics: Diagnostics,
+    pub(crate) patience: Duration,
+    /// The last message found no room.
+    pub(crate) is_full: AtomicBool,
 }
 
 impl RawPublisher {
@@ -47,13 +60,17 @@ impl RawPublisher {
         &self.topic
     }
 
-    /// Publishes a message: its CDR (little-endian) without the encapsulation header. Waits, for a
-    /// second at most, while a reliable reader has not yet acknowledged enough of what was sent
+    /// Publishes a message: its CDR (little-endian) without the encapsulation header. Waits, for half
+    /// a minute at most, while a reliable reader has not yet acknowledged enough of what was sent
     /// before. A message that could not be sent shows in the diagnostics.
     pub async fn publish(&self, body: Vec<u8>) {
-        if let Err(error) = self.writer.async_publish(RawCdr::padded(body)).await {
-            tracing::warn!("{}: message not sent: {error}", self.topic);
-            self.diagnostics.unsent(&self.topic, error.to_string());
+        let is_full = self.is_full.load(Ordering::Relaxed);
+        let patience = if is_full { self.patience / IMPATIENT } else { self.patience };
+        let sent = within(patience, self.writer.async_publish(RawCdr::padded(body))).await;
+        self.is_full.store(sent.is_err(), Ordering::Relaxed);
+        if let Err(reason) = sent {
+            tracing::warn!("{}: message not sent: {reason}", self.topic);
+            self.diagnostics.unsent(&self.topic, reason);
         }
     }
 
@@ -65,6 +82,17 @@ impl RawPublisher {
     }
 }
 
+/// The end of `sending`, or that it took too long, so that no reader can hold a node's loop up for good.
+async fn within<E: std::fmt::Display>(
+    patience: Duration,
+    sending: impl Future<Output = Result<(), E>>,
+) -> Result<(), String> {
+    match tokio::time::timeout(patience, sending).await {
+        Ok(sent) => sent.map_err(|error| error.to_string()),
+        Err(_) => Err(format!("its readers have made no room for {} s", patience.as_secs_f64())),
+    }
+}
+
 /// A publisher of messages of type `M`.
 pub struct Publisher<M> {
     pub(crate) raw: RawPublisher,
@@ -72,7 +100,7 @@ pub struct Publisher<M> {
 }
 
 impl<M: Message> Publisher<M> {
-    /// Publishes a message; see [`RawPublisher::publish`].
+    /// Publishes a message as [`RawPublisher::publish`] does, but waits for a second at most.
     pub async fn publish(&self, message: &M) {
         match cdr_encoding::to_vec::<M, LittleEndian>(message) {
             Ok(body) => self.raw.publish(body).await,
@@ -97,6 +125,14 @@ impl<M: Message> Publisher<M> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[tokio::test]
+    async fn readers_that_never_make_room_cost_a_message_and_no_more() {
+        let never = std::future::pending::<Result<(), String>>();
+        let reason = within(Duration::from_millis(10), never).await.unwrap_err();
+        assert!(reason.contains("0.01 s"), "{reason}");
+        assert_eq!(within(PATIENCE, async { Err("full") }).await, Err("full".to_owned()));
+    }
 
     #[test]
     fn raw_messages_are_padded_and_otherwise_untouched() {

@@ -2,17 +2,14 @@
 
 use std::future::Future;
 use std::io::Write as _;
-use std::os::unix::process::CommandExt as _;
-use std::process::Command;
 use std::time::Duration;
 
-use tokio::signal::unix::{SignalKind, signal};
-
+use crate::guard::Guard;
 use crate::node::Ended;
-use crate::{Error, Node};
+use crate::{Error, Node, restart};
 
 /// Time that computations still running have to end when the node is done.
-const COMPUTATION_TIME: Duration = Duration::from_secs(1);
+const COMPUTATION_TIME: Duration = Duration::from_millis(300);
 
 /// How settings are given, the same for every node.
 const USAGE: &str = "\
@@ -22,11 +19,24 @@ const USAGE: &str = "\
 Example: take another odometry topic, in the namespace /car
 
     NODE --ros-args -r odom:=/car_state/odom -r __ns:=/car
+
+## As every node of the suite
+SIGINT and SIGTERM end it within two seconds. Parameter `memory_limit_mb` (512; 0: none): beyond it the node starts itself anew, with what
+it held forgotten. Exit codes: 0 ended as asked, 1 it could not start or go on, or had to be ended by force; the last line says why.
+Parts of `/diagnostics` that every node has:
+
+| part | level | when |
+| --- | --- | --- |
+| `process` | ERROR | the node's loop has stalled for more than two seconds |
+| `process` | WARN | more than four fifths of `memory_limit_mb` are held |
+| `transport` | WARN | messages could not be decoded, or not be sent within a second |
+| `input TOPIC` | WARN | nothing has arrived for five seconds on a topic that the node needs; the text, which is in the log too, names who publishes there |
 ";
 
 /// Runs the node that the program calls `name`: `setup` declares its parameters and topics and
-/// gives its work. The process ends when the work does, or on SIGINT or SIGTERM; the work is then
-/// dropped at its next `await`. Where DDS has stopped, as it does when a suspended process goes on, the process starts anew in its place, with
+/// gives its work. The process ends when the work does, or on SIGINT or SIGTERM: the work is dropped at its next `await`, and the
+/// process has ended two seconds later whatever it does. Where DDS has stopped, as it does when a suspended process goes on, or the
+/// process holds more memory than the parameter `memory_limit_mb` allows, it starts anew in its place, with
 /// the same arguments; what it held is gone. With `--help` it prints `manual`, the text of the node's README,
 /// and ends.
 ///
@@ -42,12 +52,23 @@ where
         let text = format!("{manual}\n{}", USAGE.replace("NODE", name));
         return Ok(std::io::stdout().write_all(text.as_bytes()).map_err(Error::Process)?);
     }
+    let guard = Guard::start()?;
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(Error::Process)?;
+    if runtime.block_on(async { tokio::time::timeout(restart::pause(), guard.asked()).await }).is_ok() {
+        return Ok(());
+    }
     let ended = runtime.block_on(async {
-        let mut node = Node::start(name, std::env::args())?;
-        let end = signalled().map_err(Error::Process)?;
+        let mut node = Node::start(name, std::env::args(), &guard)?;
         let work = setup(&mut node)?;
-        Ok::<_, E>(node.run(work, end).await)
+        node.check_parameters()?;
+        let beat = guard.beat();
+        let work = async {
+            tokio::select! {
+                result = work => result,
+                never = beat => match never {},
+            }
+        };
+        Ok::<_, E>(node.run(work, guard.asked()).await)
     });
     if let Ok(Ended::Deaf) = &ended {
         tracing::error!("DDS has stopped, as it does when a suspended process goes on: starting anew");
@@ -55,17 +76,7 @@ where
     runtime.shutdown_timeout(COMPUTATION_TIME);
     match ended? {
         Ended::Work(result) => result,
-        Ended::Deaf => Err(start_anew().into()),
-    }
-}
-
-/// Replaces this process by a new start of the same program; what it gives is why that failed.
-fn start_anew() -> Error {
-    let mut arguments = std::env::args_os();
-    let called = arguments.next().unwrap_or_default();
-    match std::env::current_exe() {
-        Ok(program) => Error::Process(Command::new(program).arg0(called).args(arguments).exec()),
-        Err(error) => Error::Process(error),
+        Ended::Deaf => Err(Error::Process(restart::start_anew(guard.age())).into()),
     }
 }
 
@@ -73,19 +84,6 @@ fn start_anew() -> Error {
 fn asks_for_help(arguments: impl IntoIterator<Item = String>) -> bool {
     let mut own = arguments.into_iter().skip(1).take_while(|word| word != "--ros-args");
     own.any(|word| word == "-h" || word == "--help")
-}
-
-/// Resolves on SIGINT or SIGTERM.
-fn signalled() -> std::io::Result<impl Future<Output = ()>> {
-    let mut interrupt = signal(SignalKind::interrupt())?;
-    let mut terminate = signal(SignalKind::terminate())?;
-    Ok(async move {
-        tokio::select! {
-            _ = interrupt.recv() => {}
-            _ = terminate.recv() => {}
-        }
-        tracing::info!("asked to end");
-    })
 }
 
 #[cfg(test)]

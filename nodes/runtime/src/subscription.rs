@@ -5,17 +5,24 @@ use gripsight_msgs::Message;
 use tokio::sync::{mpsc, watch};
 
 use crate::diagnostics::Diagnostics;
+use crate::inputs::Arrivals;
 
 /// A subscription to messages of type `M`.
 pub struct Subscription<M> {
     pub(crate) topic: String,
     pub(crate) messages: mpsc::Receiver<M>,
+    pub(crate) arrivals: Arrivals,
 }
 
 impl<M> Subscription<M> {
     /// The topic's absolute name.
     pub fn topic(&self) -> &str {
         &self.topic
+    }
+
+    /// What arrives, for [`Node::needs`](crate::Node::needs).
+    pub fn arrivals(&self) -> Arrivals {
+        self.arrivals.clone()
     }
 
     /// The next message, in the order of arrival; `None` once the node shuts down. A message that
@@ -29,6 +36,7 @@ impl<M> Subscription<M> {
 pub(crate) async fn forward<M: Message>(
     reader: ros2_client::Subscription<M>,
     topic: String,
+    arrivals: Arrivals,
     messages: mpsc::Sender<M>,
     diagnostics: Diagnostics,
     mut stop: watch::Receiver<bool>,
@@ -38,6 +46,7 @@ pub(crate) async fn forward<M: Message>(
         while let Some(received) = stream.next().await {
             match received {
                 Ok((message, _)) => {
+                    arrivals.add();
                     if messages.send(message).await.is_err() {
                         break;
                     }

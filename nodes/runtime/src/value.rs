@@ -135,6 +135,21 @@ impl ParameterValue {
     }
 }
 
+impl From<ParameterValue> for ros2_client::ParameterValue {
+    fn from(value: ParameterValue) -> Self {
+        match value {
+            ParameterValue::Bool(value) => Self::Boolean(value),
+            ParameterValue::Integer(value) => Self::Integer(value),
+            ParameterValue::Double(value) => Self::Double(value),
+            ParameterValue::Text(value) => Self::String(value),
+            ParameterValue::Bools(values) => Self::BooleanArray(values),
+            ParameterValue::Integers(values) => Self::IntegerArray(values),
+            ParameterValue::Doubles(values) => Self::DoubleArray(values),
+            ParameterValue::Texts(values) => Self::StringArray(values),
+        }
+    }
+}
+
 /// A Rust type that a parameter can have.
 pub trait ParameterType: Clone + Send + Sync + 'static {
     /// The value as a parameter.

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde_saphyr::Spanned;
 
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Yaml {
@@ -12,7 +13,16 @@ pub(crate) enum Yaml {
     Double(f64),
     Text(String),
     Sequence(Vec<Yaml>),
-    Mapping(Vec<(String, Yaml)>),
+    Mapping(Vec<Entry>),
+}
+
+/// An entry of a mapping.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Entry {
+    pub(crate) key: String,
+    pub(crate) value: Yaml,
+    /// Line of the value in the document, from 1.
+    pub(crate) line: u64,
 }
 
 /// Reads a YAML document; the error is a sentence.
@@ -77,8 +87,8 @@ impl<'de> Visitor<'de> for YamlVisitor {
 
     fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Yaml, A::Error> {
         let mut mapping = Vec::new();
-        while let Some(entry) = entries.next_entry()? {
-            mapping.push(entry);
+        while let Some((key, Spanned { value, referenced, .. })) = entries.next_entry::<_, Spanned<Yaml>>()? {
+            mapping.push(Entry { key, value, line: referenced.line() });
         }
         Ok(Yaml::Mapping(mapping))
     }

@@ -47,7 +47,9 @@ pub(crate) fn status(activity: &Activity, figures: &Figures) -> Status {
             (Level::Warn, format!("a candidate is about sequence {sequence_id}, which has not come"))
         }
         Activity::Training { candidate } => (Level::Ok, format!("learning the residual of {candidate}")),
-        Activity::Failed { reason } => (Level::Error, reason.clone()),
+        Activity::Failed { reason } => {
+            (Level::Error, format!("the last candidate could not be answered: {reason}"))
+        }
     };
     Status::new(level, text)
         .value("sequences held", figures.sequences)
@@ -59,6 +61,8 @@ pub(crate) fn status(activity: &Activity, figures: &Figures) -> Status {
 
 #[cfg(test)]
 mod tests {
+    use gripsight_runtime::manual_covers;
+
     use super::*;
 
     #[test]
@@ -68,5 +72,17 @@ mod tests {
         assert_eq!(level(Activity::Training { candidate: "c".into() }), Level::Ok);
         assert_eq!(level(Activity::WaitingForSequence { sequence_id: 3 }), Level::Warn);
         assert_eq!(level(Activity::Failed { reason: "r".into() }), Level::Error);
+    }
+
+    #[test]
+    fn the_manual_lists_every_state() {
+        let states = [
+            Activity::Idle,
+            Activity::Training { candidate: "c".into() },
+            Activity::WaitingForSequence { sequence_id: 3 },
+            Activity::Failed { reason: "r".into() },
+        ];
+        let states = states.map(|activity| status(&activity, &Figures::default()));
+        assert_eq!(manual_covers(include_str!("../README.md"), &states), Ok(()));
     }
 }

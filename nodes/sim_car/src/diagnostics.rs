@@ -24,7 +24,7 @@ pub(crate) struct State {
 pub(crate) fn status(state: &State) -> Status {
     let stale = state.command_age_s.is_some_and(|age| age > state.command_timeout_s);
     let (level, message) = match &state.end {
-        Some(reason) => (Level::Error, reason.clone()),
+        Some(reason) => (Level::Error, format!("the car cannot go on: {reason}")),
         None if state.lag_s > LAG_LIMIT_S => (Level::Warn, "cannot keep up with the clock".to_owned()),
         None if stale => (Level::Warn, "no drive commands: braking".to_owned()),
         None => (Level::Ok, "driving".to_owned()),
@@ -41,6 +41,8 @@ pub(crate) fn status(state: &State) -> Status {
 
 #[cfg(test)]
 mod tests {
+    use gripsight_runtime::manual_covers;
+
     use super::*;
 
     #[test]
@@ -49,9 +51,11 @@ mod tests {
         assert_eq!(status(&driving).level, Level::Ok);
         let silent = status(&State { command_age_s: Some(f64::INFINITY), ..driving.clone() });
         assert_eq!((silent.level, silent.message.as_str()), (Level::Warn, "no drive commands: braking"));
-        assert_eq!(status(&State { lag_s: 1.0, ..driving.clone() }).level, Level::Warn);
+        let late = status(&State { lag_s: 1.0, ..driving.clone() });
+        assert_eq!(late.level, Level::Warn);
         let over = status(&State { end: Some("the car rolled over at 1.000 s".into()), ..driving });
         assert_eq!(over.level, Level::Error);
         assert!(over.message.contains("rolled over"));
+        assert_eq!(manual_covers(include_str!("../README.md"), &[silent, late, over]), Ok(()));
     }
 }

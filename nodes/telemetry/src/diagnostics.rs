@@ -1,7 +1,6 @@
 //! The node's state in words.
 
 use gripsight_runtime::{Level, Status};
-use gripsight_signals::Excitation;
 
 use crate::buffer::Counts;
 
@@ -15,7 +14,8 @@ pub(crate) struct Facts<'a> {
     /// Samples in the open window, and its length.
     pub(crate) filling: (usize, f64),
     pub(crate) last_problem: Option<&'a str>,
-    pub(crate) last_excitation: Option<&'a Excitation>,
+    /// Why the last window is not worth an identification.
+    pub(crate) insufficient: Option<&'a str>,
 }
 
 /// ERROR: nothing arrives on `odom` or `drive`. WARN: messages were left out, or the last window is not worth an identification.
@@ -30,7 +30,7 @@ pub(crate) fn status(facts: &Facts<'_>) -> Status {
     } else if facts.newly_rejected > 0 {
         let last = facts.last_problem.unwrap_or("repeated stamps");
         (Level::Warn, format!("{} messages left out; last: {last}", facts.newly_rejected))
-    } else if let Some(reason) = facts.last_excitation.and_then(|e| e.insufficient.as_deref()) {
+    } else if let Some(reason) = facts.insufficient {
         (Level::Warn, format!("the last window is not worth an identification: {reason}"))
     } else {
         (Level::Ok, "collecting".to_owned())
@@ -48,6 +48,8 @@ pub(crate) fn status(facts: &Facts<'_>) -> Status {
 
 #[cfg(test)]
 mod tests {
+    use gripsight_runtime::manual_covers;
+
     use super::*;
 
     fn facts() -> Facts<'static> {
@@ -57,7 +59,7 @@ mod tests {
             newly_rejected: 0,
             filling: (10, 30.0),
             last_problem: None,
-            last_excitation: None,
+            insufficient: None,
         }
     }
 
@@ -68,5 +70,18 @@ mod tests {
         assert!(status(&Facts { new: [9, 0, 0, 0], ..facts() }).message.contains("drive"));
         let rejected = status(&Facts { newly_rejected: 3, last_problem: Some("v_x is NaN"), ..facts() });
         assert_eq!((rejected.level, rejected.message.contains("NaN")), (Level::Warn, true));
+    }
+
+    #[test]
+    fn the_manual_lists_every_state() {
+        let states = [
+            facts(),
+            Facts { new: [0, 0, 3, 3], ..facts() },
+            Facts { new: [0, 50, 0, 0], ..facts() },
+            Facts { new: [9, 0, 0, 0], ..facts() },
+            Facts { newly_rejected: 3, ..facts() },
+            Facts { insufficient: Some("too slow"), ..facts() },
+        ];
+        assert_eq!(manual_covers(include_str!("../README.md"), &states.map(|facts| status(&facts))), Ok(()));
     }
 }

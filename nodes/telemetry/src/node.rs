@@ -63,6 +63,12 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
     let mut wheels = node.subscription::<JointState>("wheels", sensor)?;
     let mut mapped = mapped::subscribe(node, &live, sensor)?;
     let [odom_used, drive_used, imu_used, wheels_used] = Role::ALL.map(|role| mapped::follows(&live, role));
+    if odom_used {
+        node.needs([odometry.arrivals()]);
+    }
+    if drive_used {
+        node.needs([drive.arrivals()]);
+    }
     let outputs = Outputs {
         sequence: node.publisher("~/sequence", Qos::latched().with_depth(SEQUENCE_DEPTH))?,
         excitation: node.publisher("~/excitation", Qos::latched())?,
@@ -122,7 +128,7 @@ impl State {
             newly_rejected: counts.rejected - self.seen.rejected,
             filling: self.buffer.filling(),
             last_problem: self.buffer.last_problem.as_deref(),
-            last_excitation: self.last_excitation.as_ref(),
+            insufficient: self.last_excitation.as_ref().and_then(|e| e.insufficient.as_deref()),
         }
     }
 }

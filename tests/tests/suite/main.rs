@@ -5,6 +5,8 @@
 mod bag_player;
 mod camera_prior;
 mod gap_diagnosis;
+mod guard;
 mod identification;
+mod parameters;
 mod runtime;
 mod sim_car;

@@ -17,7 +17,7 @@ const PACEJKA: &str = "gripsight_msgs/msg/PacejkaParams";
 const SEQUENCE: &str = "gripsight_msgs/msg/StateSequence";
 
 /// The node under test, once it is up.
-fn source(domain: &Domain, ros_args: &[&str]) -> Process {
+pub(crate) fn source(domain: &Domain, ros_args: &[&str]) -> Process {
     let node = node(domain, "result_source", ros_args);
     node.wait_for_log("publishes as", PATIENCE);
     node
@@ -123,75 +123,6 @@ fn names_are_remapped() {
         &["subscribe", "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "--qos", "reliable"],
     );
     assert_eq!(message::<DiagnosticArray>(&diagnostics).status[0].name, "car/mpc_source: transport");
-}
-
-#[test]
-fn parameters_come_from_files_and_answer_to_services() {
-    let cyclone = cyclone();
-    if !available(std::slice::from_ref(&cyclone)) {
-        return;
-    }
-    let python = cyclone.unwrap();
-    let domain = Domain::new();
-    let file = std::env::temp_dir().join(format!("gripsight_parameters_{}.yaml", std::process::id()));
-    std::fs::write(&file, "/**:\n  ros__parameters:\n    samples: 20\n    vehicle: {name: rc10}\n").unwrap();
-    // The service mapping follows the RMW of the other side.
-    let mut command = std::process::Command::new(gripsight_tests::process::program("result_source"));
-    command.env("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp");
-    command.args(["--ros-args", "--params-file", file.to_str().unwrap(), "-p", "seed:=3"]);
-    let node = Process::start(&domain, command);
-    node.wait_for_log("rc10 publishes as /result_source", PATIENCE);
-
-    let call = |service: &str, type_name: &str, request: Value| {
-        let type_name = format!("rcl_interfaces/srv/{type_name}");
-        let service = format!("/result_source/{service}");
-        let request = request.to_string();
-        message::<Value>(&start_cyclone(&domain, &python, &["call", &service, &type_name, &request]))
-    };
-    let listed = call("list_parameters", "ListParameters", json!({}));
-    assert_eq!(
-        listed["result"]["names"],
-        json!(["reliable_inputs", "samples", "seed", "use_sim_time", "vehicle.name"])
-    );
-    let set = |value: Value| json!({"parameters": [{"name": "samples", "value": value}]});
-    let results = call("set_parameters", "SetParameters", set(json!({"type": 2, "integer_value": 30})));
-    assert_eq!(results["results"], json!([{"successful": true, "reason": ""}]));
-    let refused = call("set_parameters", "SetParameters", set(json!({"type": 2, "integer_value": 0})));
-    assert!(refused["results"][0]["reason"].as_str().unwrap().contains("expected 1 to 100000, got 0"));
-    let got = call("get_parameters", "GetParameters", json!({"names": ["samples", "seed", "none"]}));
-    let values = got["values"].as_array().unwrap();
-    let integers: Vec<_> =
-        values.iter().map(|value| (value["type"].clone(), value["integer_value"].clone())).collect();
-    assert_eq!(integers, [(json!(2), json!(30)), (json!(2), json!(3)), (json!(0), json!(0))]);
-    let described = call("describe_parameters", "DescribeParameters", json!({"names": ["samples"]}));
-    assert_eq!(described["descriptors"][0]["description"], "Samples per sequence");
-    assert_eq!(described["descriptors"][0]["integer_range"][0]["to_value"], 100_000);
-    let typed = call("get_parameter_types", "GetParameterTypes", json!({"names": ["vehicle.name"]}));
-    assert_eq!(typed["types"], json!([4]));
-    let atomic = json!({"parameters": [
-        {"name": "samples", "value": {"type": 2, "integer_value": 40}},
-        {"name": "vehicle.name", "value": {"type": 4, "string_value": "other"}},
-    ]});
-    let result = call("set_parameters_atomically", "SetParametersAtomically", atomic);
-    assert!(result["result"]["reason"].as_str().unwrap().contains("read-only"));
-    let unchanged = call("get_parameters", "GetParameters", json!({"names": ["samples"]}));
-    assert_eq!(unchanged["values"][0]["integer_value"], 30);
-    std::fs::remove_file(&file).unwrap();
-}
-
-/// The other mapping of services to DDS, that of rmw_fastrtps.
-#[test]
-fn fast_dds_asks_for_a_parameter() {
-    let fast_dds = fast_dds();
-    if !available(std::slice::from_ref(&fast_dds)) {
-        return;
-    }
-    let domain = Domain::new();
-    let _node = source(&domain, &["-p", "seed:=12"]);
-    let mut command = std::process::Command::new(fast_dds.unwrap());
-    command.args(["get", "/result_source", "seed", "20"]);
-    // One value, of type 2 (integer): 12.
-    assert_eq!(Process::start(&domain, command).line(PATIENCE), "1 2 12");
 }
 
 #[test]
@@ -306,9 +237,17 @@ fn a_node_that_was_stopped_and_goes_on_is_heard_again() {
 }
 
 #[test]
-fn a_wrong_parameter_stops_the_start() {
+fn enforced_security_stops_the_start() {
     let domain = Domain::new();
-    let mut node = node(&domain, "result_source", &["-p", "samples:=0"]);
-    node.wait_for_log("expected 1 to 100000, got 0", PATIENCE);
-    assert!(!node.wait(PATIENCE).success());
+    let start = |strategy: &str| {
+        let mut command = std::process::Command::new(gripsight_tests::process::program("stubborn_node"));
+        command.env("ROS_SECURITY_ENABLE", "true").env("ROS_SECURITY_STRATEGY", strategy);
+        Process::start(&domain, command)
+    };
+    let mut refused = start("Enforce");
+    refused.wait_for_log("this node cannot authenticate or encrypt", PATIENCE);
+    assert!(!refused.wait(PATIENCE).success());
+    let open = start("Permissive");
+    open.wait_for_log("runs open", PATIENCE);
+    open.wait_for_log("up as", PATIENCE);
 }
