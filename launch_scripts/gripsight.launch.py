@@ -24,6 +24,7 @@ ARGUMENTS = [
     ("vehicle", None, "the car: a ROS 2 parameter file with a `vehicle` block"),
     ("stack", "gripsight", "topic names: a file of params/stacks, or a path to one like it"),
     ("params", str(project_folder() / "params" / "suite.yaml"), "parameters of the nodes"),
+    ("namespace", "", "the car's name, where several share a domain: nodes and the stack's topics are below it"),
     ("bag", "", "play this bag into the suite, then stop"),
     ("rate", "1.0", "speed of the replay"),
     ("linger_s", "20.0", "time for the last run after the bag's end, s"),
@@ -33,8 +34,8 @@ ARGUMENTS = [
 ]
 
 
-def topics_of(stack: str) -> dict:
-    """The car's topic for each of the suite's names."""
+def topics_of(stack: str, namespace: str) -> dict:
+    """The car's topic for each of the suite's names; in a namespace they are relative to it."""
     path = Path(stack)
     if not path.is_file():
         path = project_folder() / "params" / "stacks" / f"{stack}.yaml"
@@ -42,13 +43,27 @@ def topics_of(stack: str) -> dict:
         raise RuntimeError(f"no stack '{stack}': neither a file nor one of params/stacks")
     entries = yaml.safe_load(path.read_text()) or {}
     names = {name: entry.get("topic") if isinstance(entry, dict) else entry for name, entry in entries.items()}
-    return {"file": str(path.resolve()), **{name: topic for name, topic in names.items() if topic}}
+    found = {name: topic.lstrip("/") if namespace else topic for name, topic in names.items() if topic}
+    return {"file": str(path.resolve()), **found}
+
+
+def check(value: dict) -> None:
+    """Tells what is missing before anything has started: half a suite is worse than none."""
+    for name in ("vehicle", "params"):
+        if not Path(value[name]).is_file():
+            raise RuntimeError(f"{name}:={value[name]}: no such file")
+    if value["bag"] and not Path(value["bag"]).exists():
+        raise RuntimeError(f"bag:={value['bag']}: no such bag")
 
 
 def nodes(context):
-    """The nodes, as the launch arguments say."""
+    """The nodes, as the launch arguments say. The end of one ends the suite: it runs whole or not at all."""
     value = {name: LaunchConfiguration(name).perform(context) for name, _, _ in ARGUMENTS}
-    topics = topics_of(value["stack"])
+    check(value)
+    space = value["namespace"].strip("/")
+    topics = topics_of(value["stack"], space)
+    # What a node names by the stack's own, absolute name is moved into the namespace.
+    moved = sorted({(f"/{topic}", topic) for name, topic in topics.items() if name != "file"}) if space else []
     replay = {"reliable_inputs": True, "use_sim_time": True} if value["bag"] else {}
 
     def remaps(*names):
@@ -60,13 +75,16 @@ def nodes(context):
             package=f"gripsight_{name}",
             executable=name,
             name=name,
+            namespace=f"/{space}" if space else None,
             parameters=[*defaults, value["params"], value["vehicle"], {**replay, **parameters}],
             remappings=list(remappings),
-            output="screen",
+            # On the terminal, and in a file of the launch's log folder.
+            output="both",
+            on_exit=[EmitEvent(event=Shutdown(reason=f"{name} ended"))],
         )
 
     started = [
-        node("telemetry", remaps("odom", "drive", "imu", "wheels"), topics_file=topics["file"]),
+        node("telemetry", [*remaps("odom", "drive", "imu", "wheels"), *moved], topics_file=topics["file"]),
         node(
             "s4_residual",
             [*remaps("odom", "drive"), ("sequence", "telemetry/sequence"), ("candidate", "identifier/candidate")],
@@ -94,11 +112,19 @@ def nodes(context):
         player = Node(
             package="gripsight_bag_player",
             executable="bag_player",
+            namespace=f"/{space}" if space else None,
+            remappings=moved,
             parameters=[{"bag": value["bag"], "rate": float(value["rate"])}],
-            output="screen",
+            output="both",
         )
         end = [TimerAction(period=float(value["linger_s"]), actions=[EmitEvent(event=Shutdown(reason="bag played"))])]
-        started += [player, RegisterEventHandler(OnProcessExit(target_action=player, on_exit=end))]
+        failed = [EmitEvent(event=Shutdown(reason="the bag was not played to its end"))]
+        started += [
+            player,
+            RegisterEventHandler(
+                OnProcessExit(target_action=player, on_exit=lambda event, _: failed if event.returncode else end)
+            ),
+        ]
     return started
 
 

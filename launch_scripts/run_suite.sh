@@ -14,11 +14,12 @@ Usage: launch_scripts/run_suite.sh --vehicle FILE [options]
   --linger SECONDS  time for the last run after the bag's end                          [20]
   --prior-mu MU     publish this friction prior (else the camera_prior node has none)
   --camera          use the camera's pictures for the friction prior (params/camera_prior.yaml)
+  --namespace NAME  the car's name, where several share a domain: nodes and the stack's topics are below it (/NAME/odom)
   --gap             diagnose the gap too (node gap_diagnosis)
   --bin FOLDER      where the nodes' binaries are                                      [target/release]
   -h, --help        this text
 
-Results arrive on /identifier/pacejka. Ctrl-C stops every node.
+Results arrive on /identifier/pacejka (/NAME/identifier/pacejka). Ctrl-C stops every node, and so does the end of one of them: the suite runs whole or not at all.
 The environment counts as for any ROS 2 node: ROS_DOMAIN_ID, ROS_LOCALHOST_ONLY, ROS_AUTOMATIC_DISCOVERY_RANGE.
 
 Examples:
@@ -29,7 +30,7 @@ TEXT
 
 root=$(cd "$(dirname "$0")/.." && pwd)
 vehicle='' stack=gripsight params=$root/params/suite.yaml bag='' rate=1.0 linger=20 prior='' camera=false gap=false
-bin=$root/target/release
+bin=$root/target/release space=''
 fail() { printf 'run_suite: %s\n' "$1" >&2; exit "${2:-2}"; }
 while (($#)); do
     case $1 in
@@ -46,6 +47,7 @@ while (($#)); do
         --rate) rate=$2 ;;
         --linger) linger=$2 ;;
         --prior-mu) prior=$2 ;;
+        --namespace) space=${2#/} ;;
         --bin) bin=$2 ;;
         *) fail "unknown option '$1' (see --help)" ;;
     esac
@@ -57,42 +59,89 @@ for file in "$vehicle" "$stack" "$params"; do [[ -f $file ]] || fail "no file '$
 if [[ -n $bag && ! -e $bag ]]; then fail "no bag '$bag'"; fi
 
 # A stack's file maps the suite's topic names to the car's: `odom: /car_state/odom`. What it maps signal by signal, telemetry reads itself.
+# In a namespace the stack's topics are relative to it.
+slash=/
+if [[ -n $space ]]; then slash=''; fi
 remaps() {
     local name
     for name in "$@"; do
-        sed -n -e "s|^$name: *{topic: *\([^ ,}]*\).*|-r\n$name:=\1|p" -e "s|^$name: *\(/[^ #]*\).*|-r\n$name:=\1|p" "$stack"
+        sed -n -e "s|^$name: *{topic: */\([^ ,}]*\).*|-r\n$name:=$slash\1|p" -e "s|^$name: */\([^ #]*\).*|-r\n$name:=$slash\1|p" "$stack"
     done
 }
+# Every topic of the stack's file, moved into the namespace.
+moved() {
+    if [[ -n $space ]]; then
+        sed -n -e 's|.*topic: */\([^ ,}]*\).*|-r\n/\1:=\1|p' -e 's|^[^:#]*: */\([^ #]*\).*|-r\n/\1:=\1|p' "$stack"
+    fi
+}
+
+nodes=(telemetry s4_residual identifier)
+if $camera || [[ -n $prior ]]; then nodes+=(camera_prior); fi
+if $gap; then nodes+=(gap_diagnosis); fi
+if [[ -n $bag ]]; then nodes+=(bag_player); fi
+# What is missing is told before anything has started.
+for node in "${nodes[@]}"; do
+    [[ -x $bin/$node ]] || fail "no binary '$bin/$node': build it with cargo build --release" 1
+done
 
 pids=()
+declare -A name_of
+prefix=()
+# Where the shell itself is killed its nodes end, too.
+if command -v setpriv >/dev/null; then prefix=(setpriv --pdeathsig TERM); fi
+spawn() {
+    local node=$1
+    shift
+    "${prefix[@]}" "$@" &
+    pids+=($!)
+    name_of[$!]=$node
+}
 priority=()
 defaults=()
+below=()
+if [[ -n $space ]]; then below=(-r "__ns:=/$space"); fi
 start() {
     local node=$1
     shift
-    [[ -x $bin/$node ]] || fail "no binary '$bin/$node': build it with cargo build --release" 1
-    "${priority[@]}" "$bin/$node" --ros-args "${defaults[@]}" --params-file "$params" --params-file "$vehicle" "$@" &
-    pids+=($!)
+    spawn "$node" "${priority[@]}" "$bin/$node" --ros-args "${defaults[@]}" --params-file "$params" --params-file "$vehicle" "${below[@]}" "$@"
 }
+# A node ends within two seconds of the signal; what is stopped (SIGSTOP) takes none, and is killed.
 # shellcheck disable=SC2329
 stop() {
-    trap - EXIT INT TERM
-    if ((${#pids[@]})); then
-        kill -INT "${pids[@]}" 2>/dev/null || true
-        wait "${pids[@]}" 2>/dev/null || true
-    fi
+    local pid tries
+    trap - EXIT
+    trap '' INT TERM
+    for pid in "${pids[@]}"; do kill -TERM "$pid" 2>/dev/null || true; done
+    for ((tries = 0; tries < 25; tries++)); do
+        [[ -n $(jobs -rp) ]] || break
+        sleep 0.1
+    done
+    for pid in $(jobs -p); do kill -KILL "$pid" 2>/dev/null || true; done
+    wait 2>/dev/null || true
 }
 trap stop EXIT
 trap 'exit 130' INT
 trap 'exit 143' TERM
+
+# Waits until the process $1 ends; the end of any other ends the suite.
+wait_for() {
+    local ended status
+    while true; do
+        status=0
+        wait -n -p ended "${pids[@]}" || status=$?
+        if [[ $ended == "$1" ]]; then return "$status"; fi
+        fail "${name_of[$ended]} ended (exit code $status): the suite stops" 1
+    done
+}
 
 replay=()
 if [[ -n $bag ]]; then replay=(-p reliable_inputs:=true -p use_sim_time:=true); fi
 mapfile -t car < <(remaps odom drive imu wheels)
 mapfile -t motion < <(remaps odom drive)
 mapfile -t eyes < <(remaps odom image image/compressed)
+mapfile -t all < <(moved)
 
-start telemetry "${car[@]}" -p "topics_file:=$stack" "${replay[@]}"
+start telemetry "${car[@]}" "${all[@]}" -p "topics_file:=$stack" "${replay[@]}"
 start s4_residual "${motion[@]}" -r sequence:=telemetry/sequence -r candidate:=identifier/candidate "${replay[@]}"
 start identifier "${motion[@]}" -r sequence:=telemetry/sequence -r model:=s4_residual/model -r friction:=camera_prior/friction "${replay[@]}"
 if $camera; then
@@ -108,11 +157,12 @@ if $gap; then
     start gap_diagnosis -r sequence:=telemetry/sequence -r pacejka:=identifier/pacejka "${replay[@]}"
 fi
 if [[ -z $bag ]]; then
-    wait -n "${pids[@]}" || fail "a node ended: the suite stops" 1
+    wait_for none
 else
-    "$bin/bag_player" --ros-args -p "bag:=$bag" -p "rate:=$rate" &
-    player=$!
-    pids+=("$player")
-    wait "$player"
-    sleep "$linger"
+    spawn bag_player "$bin/bag_player" --ros-args "${below[@]}" "${all[@]}" -p "bag:=$bag" -p "rate:=$rate"
+    player=${pids[-1]}
+    wait_for "$player" || fail "the bag was not played to its end" 1
+    unset 'pids[-1]'
+    spawn linger sleep "$linger"
+    wait_for "${pids[-1]}"
 fi

@@ -25,8 +25,9 @@ pub(crate) fn declare(node: &mut Node) -> anyhow::Result<Configuration> {
     let library = path(
         node,
         "onnxruntime_library",
-        "ONNX Runtime library; empty: searched beside the program and above it",
-    )?;
+        "ONNX Runtime library; empty: that of ORT_DYLIB_PATH, else searched beside the program and above it",
+    )?
+    .or_else(|| std::env::var_os("ORT_DYLIB_PATH").filter(|path| !path.is_empty()).map(PathBuf::from));
     let model =
         path(node, "model", "Network, an ONNX file; empty: searched beside the program and above it")?;
     let basis = match path(node, "basis", "Friction basis, a YAML file; empty: the released one")? {

@@ -28,7 +28,7 @@ impl Environment {
     /// [`Error::Environment`] for a value that ROS 2 does not allow, [`Error::Security`] where security is enforced.
     pub(crate) fn read(get: impl Fn(&str) -> Option<String>) -> Result<Self, Error> {
         let get = |name: &str| get(name).filter(|value| !value.is_empty());
-        if security(&get) == Some(Security::Enforced) {
+        if security(get) == Some(Security::Enforced) {
             return Err(Error::Security);
         }
         let domain_id = match get("ROS_DOMAIN_ID") {

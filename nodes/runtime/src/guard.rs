@@ -167,7 +167,7 @@ fn look(shared: &Shared, stalled: &mut bool) {
             Some(stood) => {
                 let stood_s = stood.as_secs_f64();
                 say(move || {
-                    tracing::error!("the node's loop has not turned for {stood_s:.1} s: its inputs wait")
+                    tracing::error!("the node's loop has not turned for {stood_s:.1} s: its inputs wait");
                 });
             }
             None => say(|| tracing::warn!("the node's loop turns again")),

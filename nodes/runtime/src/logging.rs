@@ -37,7 +37,7 @@ fn filter(args: &Args) -> EnvFilter {
     if let Ok(filter) = EnvFilter::try_from_default_env() {
         return filter;
     }
-    let mut directives = String::from("info,rustdds=off,ros2_client=off");
+    let mut directives = String::from("info,rustdds=off,ros2_client=off,cdr_encoding=off");
     for (logger, level) in &args.log_levels {
         let separator = if logger.is_some() { "=" } else { "" };
         let logger = logger.as_deref().unwrap_or_default();
@@ -54,7 +54,7 @@ struct RosoutLayer {
 impl<S: Subscriber> Layer<S> for RosoutLayer {
     fn on_event(&self, event: &Event<'_>, _: Context<'_, S>) {
         let metadata = event.metadata();
-        let is_transport = ["rustdds", "ros2_client", "log"];
+        let is_transport = ["rustdds", "ros2_client", "cdr_encoding", "log"];
         if is_transport.iter().any(|name| metadata.target().starts_with(name)) {
             return;
         }

@@ -7,6 +7,8 @@ mod camera_prior;
 mod gap_diagnosis;
 mod guard;
 mod identification;
+mod packaging;
 mod parameters;
 mod runtime;
 mod sim_car;
+mod whole_suite;

@@ -1,0 +1,30 @@
+//! What colcon needs of every package.
+
+use std::path::{Path, PathBuf};
+
+/// Folders of the nodes, and of the command line.
+fn packages() -> Vec<PathBuf> {
+    let nodes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../nodes");
+    let folders = std::fs::read_dir(nodes).unwrap().map(|entry| entry.unwrap().path());
+    folders.filter(|folder| folder.join("package.xml").exists()).collect()
+}
+
+/// colcon-ros-cargo hands every installed crate's source to cargo, which then looks for the workspace that the crate inherits from: in the
+/// folder above it, where `install_to_share` puts it.
+#[test]
+fn every_package_installs_the_manifest_that_it_inherits_from_and_is_built_for_release() {
+    let packages = packages();
+    assert!(packages.len() >= 8, "{packages:?}");
+    for folder in packages {
+        let manifest = std::fs::read_to_string(folder.join("Cargo.toml")).unwrap();
+        let installed = manifest.lines().find_map(|line| line.strip_prefix("install_to_share = ")).unwrap();
+        let files: Vec<String> = serde_json::from_str(installed).unwrap();
+        assert!(files.contains(&"../../Cargo.toml".to_owned()), "{}", folder.display());
+        for file in files {
+            assert!(folder.join(&file).exists(), "{}: {file}", folder.display());
+        }
+        let colcon: serde_json::Value =
+            serde_json::from_str(&std::fs::read_to_string(folder.join("colcon.pkg")).unwrap()).unwrap();
+        assert_eq!(colcon["cargo-args"], serde_json::json!(["--release"]));
+    }
+}
