@@ -142,10 +142,12 @@ pub fn message<M: DeserializeOwned>(peer: &Process) -> M {
     parsed(&peer.line(PATIENCE))
 }
 
-/// A message from a peer's line: JSON with Python's NaN, which only JSON5 has.
+/// A message from a peer's line: JSON, or with Python's NaN, which only JSON5 has.
 ///
 /// # Panics
 /// When the line is not of the type.
 pub fn parsed<M: DeserializeOwned>(line: &str) -> M {
-    json5::from_str(line).unwrap_or_else(|error| panic!("{error}: {line:.500}"))
+    serde_json::from_str(line)
+        .or_else(|_| json5::from_str(line))
+        .unwrap_or_else(|error| panic!("{error}: {line:.500}"))
 }
