@@ -70,7 +70,7 @@ pub(crate) fn doubts(recording: &Recording, vehicle: &VehicleParameters) -> Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rooms::tests::drive;
+    use crate::testing::drive;
 
     #[test]
     fn wrong_units_and_signs_are_told_and_right_ones_are_not() {

@@ -123,7 +123,7 @@ mod tests {
     use gripsight_vehicle::VehicleParameters;
 
     use super::*;
-    use crate::rooms::tests::{drive, tires};
+    use crate::testing::{drive, tires};
     use crate::trust::TireTrust;
 
     #[test]
