@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Records cars that are simulators with something changed: what `gripsight diagnose BAG --simulator FILE` is scored on.
 
-    make_simulator_pairs.py OUT SIMULATOR [NAME=VALUE ...] [--seed N] [--duration S] [--checkout PATH] [--smooth]
+    make_simulator_pairs.py OUT SIMULATOR [NAME=VALUE ...] [--seed N] [--duration S] [--checkout PATH] [--smooth] [--car KIND]
 
-SIMULATOR: f1tenth_gym, slipx, commonroad_st, commonroad_std, commonroad_mb, simple_planning. NAME: one of its parameters, or an effect
+SIMULATOR: f1tenth_gym, slipx, slipx_bicycle, commonroad_st, commonroad_std, commonroad_mb, simple_planning. NAME: one of its parameters, or an effect
 around it: delay_s, gain, offset_rad (on the command), lever_arm_m, gyro_scale (on what is recorded). OUT receives car.mcap,
 simulator.yaml, parameters.yaml and truth.json. The car is driven around a track by a driver that sees its true motion; what is recorded
-has noise. The adapters are the diagnosis' own, the integration, the driver and the noise are not.
+has noise. With --car the car is another kind of simulator than the one that is given (NAME: one of the car's), which then has no term for what
+makes them unlike. The adapters are the diagnosis' own, the integration, the driver and the noise are not.
 
 Packages: nodes/lib/reference_car/compare/requirements.txt, and numba for f1tenth_gym (a user's checkout, --checkout).
 """
@@ -34,10 +35,11 @@ def build(kind, checkout):
 
         file = f"adapter: f1tenth_gym\noptions: {{checkout: '{checkout}'}}\n"
         return a.F1tenthGym({k: a.DEFAULTS[k] for k in a.DEFAULTS}, a.load_dynamics(checkout), 0.01, "Euler"), file, 0.33, 0.9, 9.0
-    if kind == "slipx":
+    if kind in ("slipx", "slipx_bicycle"):
         import slipx_adapter as a
 
-        return a.Slipx({}, "L2_DoubleTrack", 0.002), "adapter: slipx\n", 0.32, 0.9, 9.0
+        tier = "L2_DoubleTrack" if kind == "slipx" else "L1_Bicycle"
+        return a.Slipx({}, tier, 0.002), f"adapter: slipx\noptions: {{tier: {tier}}}\n", 0.32, 0.9, 9.0
     if kind.startswith("commonroad_"):
         import commonroad_adapter as a
 
@@ -63,11 +65,12 @@ class Around:
         return self.queue.pop(0)
 
 
-def record(out, kind, changes, seed, duration_s, checkout, smooth=False, pace=0.75):
+def record(out, kind, changes, seed, duration_s, checkout, smooth=False, pace=0.75, car_kind=None):
     out.mkdir(parents=True, exist_ok=True)
-    simulator, file, wheelbase_m, mu, top_mps = build(kind, checkout)
+    given, file, _, _, _ = build(kind, checkout)
+    written = {p["name"]: p["value"] for p in given.parameters if not p.get("integer") and p["name"] != "wheel_base"}
+    simulator, _, wheelbase_m, mu, top_mps = build(car_kind or kind, checkout)
     values = {p["name"]: p["value"] for p in simulator.parameters}
-    written = {p["name"]: p["value"] for p in simulator.parameters if not p.get("integer") and p["name"] != "wheel_base"}
     lines = [f"{name}: {value!r}   # as it came" for name, value in written.items()]
     (out / "parameters.yaml").write_text("# Parameters of the simulator.\n" + "\n".join(lines) + "\n")
     (out / "simulator.yaml").write_text(file + "parameter_file: parameters.yaml\n")
@@ -125,7 +128,7 @@ def record(out, kind, changes, seed, duration_s, checkout, smooth=False, pace=0.
             y += dt * (motion["v_x_mps"] * math.sin(heading) + motion["v_y_mps"] * math.cos(heading))
             heading += dt * motion["yaw_rate_radps"]
     bag.close()
-    (out / "truth.json").write_text(json.dumps(dict(simulator=kind, changes=changes, seed=seed), indent=1) + "\n")
+    (out / "truth.json").write_text(json.dumps(dict(simulator=kind, car=car_kind or kind, changes=changes, seed=seed), indent=1) + "\n")
 
 
 def main():
@@ -137,12 +140,13 @@ def main():
     parser.add_argument("--duration", type=float, default=40.0)
     parser.add_argument("--checkout", default="f1tenth_gym")
     parser.add_argument("--smooth", action="store_true", help="steer no faster than the servo of a car")
+    parser.add_argument("--car", metavar="KIND", help="the car is this kind of simulator, and the one given another")
     a = parser.parse_args()
     changes = {name: float(value) for name, value in (c.split("=", 1) for c in a.changes)}
     pace = 0.75
     for attempt in range(5):
         try:
-            return record(a.out, a.simulator, changes, a.seed, a.duration, a.checkout, a.smooth, pace)
+            return record(a.out, a.simulator, changes, a.seed, a.duration, a.checkout, a.smooth, pace, a.car)
         except RuntimeError as error:
             print(error, file=sys.stderr)
             pace *= 0.85

@@ -96,6 +96,8 @@ const MODEL_FILE: &str = "extended_model.yaml";
 struct GapFile<'a> {
     #[serde(flatten)]
     diagnosis: &'a Diagnosis,
+    /// The car.
+    vehicle: &'a VehicleParameters,
     /// The topics used.
     topics: Vec<TopicUse<'a>>,
     /// What reading the data met, in sentences.
@@ -193,6 +195,7 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     })?;
     let gap_file = GapFile {
         diagnosis: &result,
+        vehicle: &vehicle,
         topics: topic_uses(&report.topics),
         data_notes: &notes,
         checks: &recorded.checks.checks,

@@ -12,6 +12,7 @@ mod bag;
 mod camera;
 mod data;
 mod diagnose;
+mod export;
 mod friction;
 mod identify;
 mod invocation;
@@ -46,6 +47,7 @@ enum Command {
     Identify(identify::IdentifyArgs),
     Verify(verify::VerifyArgs),
     Diagnose(diagnose::DiagnoseArgs),
+    Export(export::ExportArgs),
     Friction(friction::FrictionArgs),
     Simulate(simulate::SimulateArgs),
     Withheld(withheld::WithheldArgs),
@@ -88,6 +90,7 @@ fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Identify(args) => identify::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Friction(args) => friction::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Withheld(args) => withheld::run(&args),

@@ -39,4 +39,12 @@ pub enum ModelError {
         /// All names.
         known: String,
     },
+    /// An effect lacks a parameter.
+    #[error("{effect} needs a number for `{parameter}`")]
+    NoParameter {
+        /// Of which effect.
+        effect: &'static str,
+        /// Which.
+        parameter: &'static str,
+    },
 }

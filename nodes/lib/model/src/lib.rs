@@ -37,7 +37,9 @@
 //! Two lines in `effects/mod.rs`, the file's and one in the list `library!`, add it to the search, the file format, `--without` and the tests:
 //! at its null value it must leave the nominal model exactly as it was. If its derivative vanishes there, say `flat_at_null` and give `starts`.
 
+mod car_file;
 mod correction;
+mod drive;
 mod effects;
 mod error;
 mod flexible;
@@ -52,8 +54,12 @@ mod smooth;
 mod station;
 mod terms;
 
+pub use car_file::CarFile;
 pub use correction::{Correction, CorrectionStream};
-pub use effects::{Effect, EffectId, EffectSpec, Lagging, Need, ParameterSpec, Reported, Unknown, Usual};
+pub use drive::{Along, Controls, Drive, Driven, DrivenCar};
+pub use effects::{
+    Effect, EffectId, EffectSpec, Lagging, Need, ParameterSpec, Reported, Unknown, Usual, Wheels,
+};
 pub use error::ModelError;
 pub use flexible::{Flexible, Group, Room};
 pub use identities::{HEADING, Identity, LATERAL};

@@ -183,20 +183,24 @@ impl<'a> ExtendedModel<'a> {
         }
         let (steering, run_in) = self.road_wheel_angles(p, window);
         let mut outputs = Mover::new(self, p, &car, tires, &steering, run_in, window).run(start, push);
-        let shift = car.cog_shift_m;
+        self.sense(p, car.cog_shift_m, &mut outputs);
+        outputs
+    }
+
+    /// From the motion of the centre of gravity, which lies `shift_m` ahead of the nominal one, to the recorded signals.
+    pub(crate) fn sense<T: Real>(&self, p: &[T], shift_m: T, outputs: &mut Outputs<T>) {
         for k in 0..outputs.v_y_mps.len() {
             let (r, acceleration) = (outputs.yaw_rate_radps[k], outputs.yaw_acceleration_radps2[k]);
-            outputs.v_y_mps[k] -= shift * r;
-            outputs.a_y_mps2[k] -= shift * acceleration;
-            outputs.a_x_mps2[k] += shift * r * r;
+            outputs.v_y_mps[k] -= shift_m * r;
+            outputs.a_y_mps2[k] -= shift_m * acceleration;
+            outputs.a_x_mps2[k] += shift_m * r * r;
         }
         for (effect, values) in self.with_parameters(p) {
-            effect.sense(values, &mut outputs);
+            effect.sense(values, outputs);
         }
         if let Some(flexible) = &self.flexible {
-            flexible.sense(self.flexible_parameters(p), &mut outputs);
+            flexible.sense(self.flexible_parameters(p), outputs);
         }
-        outputs
     }
 }
 

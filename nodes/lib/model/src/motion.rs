@@ -55,7 +55,7 @@ struct Instant<'e, T> {
 }
 
 /// What an instant leaves behind for the next.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 struct Memory<T> {
     a_y_mps2: T,
     rolled_a_y_mps2: T,
@@ -66,13 +66,42 @@ struct Memory<T> {
 }
 
 /// Accelerations of an instant.
-struct Rates<T> {
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rates<T> {
     v_y_mps2: T,
-    yaw_radps2: T,
-    v_x_mps2: T,
-    a_y_mps2: T,
-    a_x_mps2: T,
+    pub(crate) yaw_radps2: T,
+    pub(crate) v_x_mps2: T,
+    pub(crate) a_y_mps2: T,
+    pub(crate) a_x_mps2: T,
     memory: Memory<T>,
+}
+
+/// The car on its way.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Moving<T> {
+    /// v_y and yaw rate.
+    pub(crate) x: [T; 2],
+    /// Forward speed, but for a constant.
+    pub(crate) speed_mps: T,
+    /// Heading, but for a constant.
+    pub(crate) heading_rad: T,
+    pub(crate) rates: Rates<T>,
+}
+
+impl Moving<f64> {
+    /// Before anything is known.
+    pub(crate) fn still() -> Self {
+        let memory = Memory {
+            a_y_mps2: 0.0,
+            rolled_a_y_mps2: 0.0,
+            front_use: 0.0,
+            slip_rad: [0.0; 2],
+            steady_rad: [0.0; 2],
+        };
+        let rates =
+            Rates { v_y_mps2: 0.0, yaw_radps2: 0.0, v_x_mps2: 0.0, a_y_mps2: 0.0, a_x_mps2: 0.0, memory };
+        Self { x: [0.0; 2], speed_mps: 0.0, heading_rad: 0.0, rates }
+    }
 }
 
 impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
@@ -106,53 +135,57 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
     pub(crate) fn run(&self, start: [T; 2], push: [T; 2]) -> Outputs<T> {
         let run = &self.model.recording.runs[self.window.segment];
         let n = self.window.len;
-        let dt_s = run.dt_s;
-        let substeps = (dt_s / self.model.substep_s - 1e-9).ceil().max(1.0);
-        let h_s = dt_s / substeps;
-        let zero = T::from(0.0);
-        let mut out = Outputs {
-            dt_s,
-            v_y_mps: Vec::with_capacity(n),
-            yaw_rate_radps: Vec::with_capacity(n),
-            yaw_acceleration_radps2: Vec::with_capacity(n),
-            a_y_mps2: Vec::with_capacity(n),
-            a_x_mps2: Vec::with_capacity(n),
-            v_x_mps: Vec::with_capacity(n),
-            heading_rad: Vec::with_capacity(n),
-        };
-        let mut x = start;
-        let (mut speed, mut heading) = (zero, zero);
+        let mut out = Outputs::of(run.dt_s, n);
         let mut residual = self.model.residual.map(|r| r.stream(run, self.window));
-        let mut extra = self.extra(0, push);
-        let mut rates = self.settled(x, h_s, &extra);
+        let mut state = self.begin(start, push);
         for k in 0..n {
             let push = match &mut residual {
-                Some(stream) => stream.next(k, [x[0].re(), x[1].re()]).map(T::from),
+                Some(stream) => stream.next(k, state.x.map(|v| v.re())).map(T::from),
                 None => push,
             };
-            extra = self.extra(k, push);
-            out.v_y_mps.push(x[0]);
-            out.yaw_rate_radps.push(x[1]);
-            out.yaw_acceleration_radps2.push(rates.yaw_radps2);
-            out.a_y_mps2.push(rates.a_y_mps2);
-            out.a_x_mps2.push(rates.a_x_mps2);
-            out.v_x_mps.push(speed);
-            out.heading_rad.push(heading);
-            if k + 1 == n {
-                break;
-            }
-            for i in 0..substeps as usize {
-                let middle = self.instant(k, (i as f64 + 0.5) / substeps, &extra);
-                let half = [x[0] + rates.v_y_mps2 * (h_s / 2.0), x[1] + rates.yaw_radps2 * (h_s / 2.0)];
-                let there = self.rates(half, &middle, &rates.memory, h_s / 2.0, self.relaxes);
-                x = [x[0] + there.v_y_mps2 * h_s, x[1] + there.yaw_radps2 * h_s];
-                speed += there.v_x_mps2 * h_s;
-                heading += half[1] * h_s;
-                let end = self.instant(k, (i as f64 + 1.0) / substeps, &extra);
-                rates = self.rates(x, &end, &rates.memory, h_s, self.relaxes);
+            out.v_y_mps.push(state.x[0]);
+            out.yaw_rate_radps.push(state.x[1]);
+            out.yaw_acceleration_radps2.push(state.rates.yaw_radps2);
+            out.a_y_mps2.push(state.rates.a_y_mps2);
+            out.a_x_mps2.push(state.rates.a_x_mps2);
+            out.v_x_mps.push(state.speed_mps);
+            out.heading_rad.push(state.heading_rad);
+            if k + 1 < n {
+                self.advance(k, &mut state, push);
             }
         }
         out
+    }
+
+    /// Number and length of the steps between two samples.
+    fn substeps(&self) -> (usize, f64) {
+        let dt_s = self.model.recording.runs[self.window.segment].dt_s;
+        let substeps = (dt_s / self.model.substep_s - 1e-9).ceil().max(1.0);
+        (substeps as usize, dt_s / substeps)
+    }
+
+    /// The car at the window's start.
+    pub(crate) fn begin(&self, x: [T; 2], push: [T; 2]) -> Moving<T> {
+        let zero = T::from(0.0);
+        let rates = self.settled(x, self.substeps().1, &self.extra(0, push));
+        Moving { x, speed_mps: zero, heading_rad: zero, rates }
+    }
+
+    /// From sample `k` of the window to the next.
+    pub(crate) fn advance(&self, k: usize, state: &mut Moving<T>, push: [T; 2]) {
+        let (substeps, h_s) = self.substeps();
+        let extra = self.extra(k, push);
+        let Moving { x, speed_mps, heading_rad, rates } = state;
+        for i in 0..substeps {
+            let middle = self.instant(k, (i as f64 + 0.5) / substeps as f64, &extra);
+            let half = [x[0] + rates.v_y_mps2 * (h_s / 2.0), x[1] + rates.yaw_radps2 * (h_s / 2.0)];
+            let there = self.rates(half, &middle, &rates.memory, h_s / 2.0, self.relaxes);
+            *x = [x[0] + there.v_y_mps2 * h_s, x[1] + there.yaw_radps2 * h_s];
+            *speed_mps += there.v_x_mps2 * h_s;
+            *heading_rad += half[1] * h_s;
+            let end = self.instant(k, (i as f64 + 1.0) / substeps as f64, &extra);
+            *rates = self.rates(*x, &end, &rates.memory, h_s, self.relaxes);
+        }
     }
 
     /// Rates at the start, as if the motion had gone on as it does there.

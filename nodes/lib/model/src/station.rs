@@ -17,6 +17,13 @@ pub struct Laps {
     ruler: Vec<(f64, f64, f64)>,
 }
 
+impl Laps {
+    /// A course of which no more than its length is known.
+    pub(crate) fn of_length(lap_m: f64) -> Self {
+        Self { lap_m, ..Self::default() }
+    }
+}
+
 /// A lap turns the car by a full turn and brings it back to within this share of the way driven since.
 const CLOSE_SHARE: f64 = 0.03;
 /// How far ahead of the last place the next is looked for, over the lap.

@@ -189,6 +189,23 @@ pub struct Outputs<T> {
     pub heading_rad: Vec<T>,
 }
 
+impl<T> Outputs<T> {
+    /// Room for `n` samples.
+    pub(crate) fn of(dt_s: f64, n: usize) -> Self {
+        let room = || Vec::with_capacity(n);
+        Self {
+            dt_s,
+            v_y_mps: room(),
+            yaw_rate_radps: room(),
+            yaw_acceleration_radps2: room(),
+            a_y_mps2: room(),
+            a_x_mps2: room(),
+            v_x_mps: room(),
+            heading_rad: room(),
+        }
+    }
+}
+
 /// A first-order lag over a step in which its input is linear: exact, and at `tau_s` = 0 exactly the input, with the right derivative.
 ///
 /// tau y' + y = u,  u = u0 + s t:  y(h) = u1 - s tau + (y0 - u0 + s tau) exp(-h/tau)

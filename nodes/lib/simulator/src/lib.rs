@@ -11,6 +11,7 @@ mod description;
 mod diagnose;
 mod drive;
 mod error;
+mod export;
 mod file;
 mod fit;
 mod flexible;
@@ -33,6 +34,7 @@ pub use description::{Channel, Description, Input, InputKind, SimulatorParameter
 pub use diagnose::{Question, diagnose, held_out_error};
 pub use drive::{Drive, Stretch, WINDOW_S, Window};
 pub use error::SimulatorError;
+pub use export::{ExportError, Exported, Target, export};
 pub use file::{Bounds, ForwardSpeed, Reference, SimulatorFile};
 pub use model::{Model, Point, Residuals};
 pub use outcome::{

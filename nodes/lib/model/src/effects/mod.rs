@@ -5,7 +5,7 @@
 //! 1. Write a file with a type that implements [`Effect`]: its [`EffectSpec`] (name, equation, source, site, parameters with units, null value,
 //!    bounds and a typical size, what must be recorded and driven to see it, and whatever else concerns this effect alone) and the hooks that
 //!    it needs. All hooks do nothing by default:
-//!    * [`Effect::steer`]: between the recorded steering and the road wheels;
+//!    * [`Effect::follow`]: between the recorded steering and the road wheels;
 //!    * [`Effect::car`]: constants (mass, inertia, axle distances, relaxation length, speed factor);
 //!    * [`Effect::loads`], [`Effect::grip`]: per axle and instant: load, extra steering angle, grip, usable share;
 //!    * [`Effect::motion`]: accelerations from outside the tires;
@@ -61,13 +61,41 @@ use crate::terms::{Axles, Car, Moment, Motion, Outputs};
 pub use spec::{EffectSpec, Lagging, Need, ParameterSpec, Reported, Unknown, Usual};
 use spec::{both_sides, positive, spec};
 
+/// What an effect between the steering and the road wheels remembers from angle to angle.
+#[derive(Debug, Clone)]
+pub struct Wheels<T> {
+    /// Its own numbers, from the first angle on.
+    kept: Option<[T; 8]>,
+    /// The step that they were made for, where they depend on one.
+    step_s: f64,
+    /// Angles, each with how long ago it was.
+    past: Vec<(f64, T)>,
+}
+
+impl<T> Default for Wheels<T> {
+    fn default() -> Self {
+        Self { kept: None, step_s: f64::NAN, past: Vec::new() }
+    }
+}
+
 /// An effect. See the module's text.
 pub trait Effect {
     /// Names, site, units, bounds, source, and rules of its own.
     const SPEC: EffectSpec;
 
-    /// Between the recorded steering and the road wheels: changes the series, `dt_s` apart.
-    fn steer<T: Real>(_p: &[T], _steering_rad: &mut [T], _dt_s: f64) {}
+    /// Between the recorded steering and the road wheels: the wheels' angle where the steering has come to an angle in a line, `dt_s` after the
+    /// angle before. Before the first the car went on straight.
+    fn follow<T: Real>(_p: &[T], _wheels: &mut Wheels<T>, steering_rad: T, _dt_s: f64) -> T {
+        steering_rad
+    }
+
+    /// The same for a series: changes it, `dt_s` apart.
+    fn steer<T: Real>(p: &[T], steering_rad: &mut [T], dt_s: f64) {
+        let mut wheels = Wheels::default();
+        for angle in steering_rad {
+            *angle = Self::follow(p, &mut wheels, *angle, dt_s);
+        }
+    }
 
     /// Changes constants of the car.
     fn car<T: Real>(_p: &[T], _car: &mut Car<T>) {}
@@ -106,6 +134,13 @@ macro_rules! library {
             pub const fn spec(self) -> &'static EffectSpec {
                 match self {
                     $(Self::$variant => &<$effect as Effect>::SPEC,)+
+                }
+            }
+
+            /// [`Effect::follow`] with its parameters `p`.
+            pub fn follow<T: Real>(self, p: &[T], wheels: &mut Wheels<T>, steering_rad: T, dt_s: f64) -> T {
+                match self {
+                    $(Self::$variant => <$effect>::follow(p, wheels, steering_rad, dt_s),)+
                 }
             }
 

@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectId, EffectSpec, positive, spec};
+use super::{Effect, EffectId, EffectSpec, Wheels, positive, spec};
 use crate::site::Site;
 
 /// Play in the steering.
@@ -23,18 +23,15 @@ impl Effect for SteeringBacklash {
         )
     };
 
-    fn steer<T: Real>(p: &[T], steering_rad: &mut [T], _dt_s: f64) {
-        let Some(&first) = steering_rad.first() else { return };
-        let mut wheel = first;
-        for u in steering_rad.iter_mut() {
-            let (low, high) = (*u - p[0], *u + p[0]);
-            if wheel.re() < low.re() {
-                wheel = low;
-            } else if wheel.re() > high.re() {
-                wheel = high;
-            }
-            *u = wheel;
+    fn follow<T: Real>(p: &[T], wheels: &mut Wheels<T>, steering_rad: T, _dt_s: f64) -> T {
+        let wheel = wheels.kept.get_or_insert([steering_rad; 8]);
+        let (low, high) = (steering_rad - p[0], steering_rad + p[0]);
+        if wheel[0].re() < low.re() {
+            wheel[0] = low;
+        } else if wheel[0].re() > high.re() {
+            wheel[0] = high;
         }
+        wheel[0]
     }
 }
 

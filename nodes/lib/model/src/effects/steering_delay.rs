@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectId, EffectSpec, positive, spec};
+use super::{Effect, EffectId, EffectSpec, Wheels, positive, spec};
 use crate::site::Site;
 use crate::terms::delayed;
 
@@ -25,6 +25,22 @@ impl Effect for SteeringDelay {
         )
     };
 
+    fn follow<T: Real>(p: &[T], wheels: &mut Wheels<T>, steering_rad: T, dt_s: f64) -> T {
+        // Times are counted back from the newest angle.
+        let past = &mut wheels.past;
+        past.iter_mut().for_each(|(ago_s, _)| *ago_s += dt_s);
+        past.push((0.0, steering_rad));
+        let older = past.iter().rposition(|(ago_s, _)| *ago_s > p[0].re()).unwrap_or(0);
+        past.drain(..older);
+        match past[..] {
+            [(before_s, before), (after_s, after), ..] if before_s > p[0].re() => {
+                before + (after - before) * ((-p[0] + before_s) / (before_s - after_s))
+            }
+            _ => past[0].1,
+        }
+    }
+
+    /// In a series the next angle is known too: a derivative by the delay exists even where there is none.
     fn steer<T: Real>(p: &[T], steering_rad: &mut [T], dt_s: f64) {
         let late = delayed(steering_rad, p[0], dt_s);
         steering_rad.copy_from_slice(&late);

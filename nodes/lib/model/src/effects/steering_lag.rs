@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectId, EffectSpec, ParameterSpec, positive, spec};
+use super::{Effect, EffectId, EffectSpec, ParameterSpec, Wheels, positive, spec};
 use crate::site::Site;
 
 /// The wheels follow the command through a servo: a lag of second order.
@@ -31,32 +31,33 @@ impl Effect for SteeringLag {
         )
     };
 
-    fn steer<T: Real>(p: &[T], steering_rad: &mut [T], dt_s: f64) {
-        let Some(&first) = steering_rad.first() else { return };
-        let (tau_s, q) = (p[0], p[1]);
-        let short = tau_s.re() < dt_s * SHORT_LAG;
-        let decay = if short { Decay::at_once() } else { Decay::of(tau_s, q, dt_s) };
-        // The wheels settle to u - tau u' where the command goes on straight: what they are off by, and its rate.
-        let (mut before, mut off, mut rate) = (first, T::from(0.0), T::from(0.0));
-        let mut slope = T::from(0.0);
-        for u in steering_rad.iter_mut() {
-            let now = (*u - before) / dt_s;
-            let turned = now - slope;
-            (off, rate) = decay.after(off + turned * tau_s, rate - turned);
-            (before, slope) = (*u, now);
-            *u += off - now * tau_s;
+    fn follow<T: Real>(p: &[T], wheels: &mut Wheels<T>, steering_rad: T, dt_s: f64) -> T {
+        let (tau_s, q, zero) = (p[0], p[1], T::from(0.0));
+        let [before, off, rate, slope, shares @ ..] =
+            wheels.kept.get_or_insert([steering_rad, zero, zero, zero, zero, zero, zero, zero]);
+        if wheels.step_s != dt_s {
+            let short = tau_s.re() < dt_s * SHORT_LAG;
+            *shares = if short { Decay::at_once() } else { Decay::of(tau_s, q, dt_s) }.shares;
+            wheels.step_s = dt_s;
         }
+        // The wheels settle to u - tau u' where the command goes on straight: what they are off by, and its rate.
+        let now = (steering_rad - *before) / dt_s;
+        let turned = now - *slope;
+        (*off, *rate) = Decay { shares: *shares }.after(*off + turned * tau_s, *rate - turned);
+        (*before, *slope) = (steering_rad, now);
+        steering_rad + (*off - now * tau_s)
     }
 }
 
 /// How q tau^2 e'' + tau e' + e = 0 goes on over a step: e(h) and e'(h) as shares of e(0) and e'(0).
 struct Decay<T> {
-    shares: [[T; 2]; 2],
+    /// Of e(h) in e(0) and e'(0), then of e'(h).
+    shares: [T; 4],
 }
 
 impl<T: Real> Decay<T> {
     fn at_once() -> Self {
-        Self { shares: [[T::from(0.0); 2]; 2] }
+        Self { shares: [T::from(0.0); 4] }
     }
 
     fn of(tau_s: T, q: T, h_s: f64) -> Self {
@@ -79,12 +80,12 @@ impl<T: Real> Decay<T> {
             (root.cos(), root.sin() / root)
         };
         let (even, odd) = (even * damped, odd * damped * h_s);
-        Self { shares: [[even + odd * half, odd], [-odd * square, even - odd * half]] }
+        Self { shares: [even + odd * half, odd, -odd * square, even - odd * half] }
     }
 
     fn after(&self, off: T, rate: T) -> (T, T) {
-        let [a, b] = &self.shares;
-        (a[0] * off + a[1] * rate, b[0] * off + b[1] * rate)
+        let [a, b, c, d] = self.shares;
+        (a * off + b * rate, c * off + d * rate)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectSpec, both_sides, spec};
+use super::{Effect, EffectSpec, Wheels, both_sides, spec};
 use crate::site::Site;
 
 /// The wheels are not straight when the recording says so.
@@ -19,10 +19,8 @@ impl Effect for SteeringOffset {
         &[both_sides("offset_rad", "rad", [0.01, 0.005])],
     );
 
-    fn steer<T: Real>(p: &[T], steering_rad: &mut [T], _dt_s: f64) {
-        for u in steering_rad {
-            *u += p[0];
-        }
+    fn follow<T: Real>(p: &[T], _wheels: &mut Wheels<T>, steering_rad: T, _dt_s: f64) -> T {
+        steering_rad + p[0]
     }
 }
 

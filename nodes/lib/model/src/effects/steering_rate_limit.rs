@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectSpec, ParameterSpec, Reported, spec};
+use super::{Effect, EffectSpec, ParameterSpec, Reported, Wheels, spec};
 use crate::site::Site;
 
 /// The limit of an inverse rate: infinite, in files `null`, where there is none.
@@ -35,24 +35,21 @@ impl Effect for SteeringRateLimit {
         )
     };
 
-    fn steer<T: Real>(p: &[T], steering_rad: &mut [T], dt_s: f64) {
-        let Some(&first) = steering_rad.first() else { return };
+    fn follow<T: Real>(p: &[T], wheels: &mut Wheels<T>, steering_rad: T, dt_s: f64) -> T {
         if p[0].re() < 1e-9 {
-            return;
+            return steering_rad;
         }
         let most = p[0].recip() * dt_s;
-        let mut wheel = first;
-        for u in steering_rad.iter_mut() {
-            let way = *u - wheel;
-            wheel = if way.re() > most.re() {
-                wheel + most
-            } else if way.re() < -most.re() {
-                wheel - most
-            } else {
-                *u
-            };
-            *u = wheel;
-        }
+        let wheel = wheels.kept.get_or_insert([steering_rad; 8]);
+        let way = steering_rad - wheel[0];
+        wheel[0] = if way.re() > most.re() {
+            wheel[0] + most
+        } else if way.re() < -most.re() {
+            wheel[0] - most
+        } else {
+            steering_rad
+        };
+        wheel[0]
     }
 }
 

@@ -5,4 +5,5 @@
 
 mod adapters;
 mod child;
+mod export;
 mod support;
