@@ -8,13 +8,11 @@ use anyhow::{Context, bail};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use gripsight_bag::{ReadReport, Role, TopicMap, read_sequences};
-use gripsight_diagnosis::{
-    Diagnosis, Earlier, ExtendedModelFile, Graded, Request, Verdict, diagnose, graded,
-};
+use gripsight_diagnosis::{Diagnosis, Earlier, ExtendedModelFile, Request, Verdict, diagnose};
 use gripsight_identification::export::{read_tires, stamp_text};
 use gripsight_identification::vehicle_hash;
 use gripsight_model::EffectId;
-use gripsight_report::{GapInput, Header, TopicUse, gap_page, gap_text, graded_text, topic_uses};
+use gripsight_report::{GapInput, Header, TopicUse, gap_page, gap_text, topic_uses};
 use gripsight_signals::{Check, StateSequence, WindowConfig};
 use gripsight_vehicle::VehicleParameters;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -38,8 +36,11 @@ use crate::{Outcome, outputs};
 pub(crate) struct DiagnoseArgs {
     /// An .mcap file or a rosbag2 folder.
     pub(crate) bag: PathBuf,
-    /// A later drive of the same car, to be compared with the first.
+    /// A later drive of the same car, to be compared with the first: the same as --later.
     bag2: Option<PathBuf>,
+    /// A later drive of the same car: what has changed from BAG to it.
+    #[arg(long, value_name = "BAG", conflicts_with_all = ["bag2", "pacejka", "extended_model"])]
+    later: Option<PathBuf>,
     /// Another drive of the car in the same state, to score on; without it every fourth block is held out.
     #[arg(long, value_name = "BAG")]
     heldout: Option<PathBuf>,
@@ -54,7 +55,7 @@ pub(crate) struct DiagnoseArgs {
     extended_model: Option<PathBuf>,
     /// Your own simulator, as a YAML file that says how to start it: what in it differs from the car, and a patch of its parameter file
     /// (DIR/simulator.patch). Effects may be left out by `--without`; its own parameters by `fixed` in the file.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["bag2", "pacejka", "extended_model", "heldout", "only", "predictions"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["bag2", "later", "pacejka", "extended_model", "heldout", "only", "predictions"])]
     pub(crate) simulator: Option<PathBuf>,
     /// Leave an effect out of the library. May be repeated.
     #[arg(long, value_name = "EFFECT", value_parser = effects(), hide_possible_values = true)]
@@ -68,10 +69,6 @@ pub(crate) struct DiagnoseArgs {
     /// Where the files go; made if it is not there.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
-    /// State beside the verdict how likely something is the matter at each site, with every mechanism and its size; of two drives what has
-    /// changed, whatever either leaves unexplained. The probabilities are not calibrated yet. Takes some seconds more.
-    #[arg(long)]
-    graded: bool,
     /// Write the bag that is explained once more, with the predictions beside its topics: /gripsight/nominal/odom of the model as it came,
     /// /gripsight/extended/odom of the model with the effects found (open-loop rollouts of half a second, each from the recorded pose on).
     #[arg(long, value_name = "BAG")]
@@ -106,9 +103,6 @@ struct GapFile<'a> {
     checks: &'a [Check],
     /// What nothing checks, bad samples, and what was estimated.
     signals: SignalsOf<'a>,
-    /// The graded answer, where it was asked for.
-    #[serde(flatten)]
-    graded: Option<&'a Graded>,
 }
 
 #[derive(Serialize)]
@@ -124,18 +118,16 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         return crate::simulator::run(args, file);
     }
     let start = Instant::now();
-    let bags: Vec<&Path> = [Some(&args.bag), args.bag2.as_ref(), args.heldout.as_ref()]
-        .into_iter()
-        .flatten()
-        .map(PathBuf::as_path)
-        .collect();
+    let bag2 = args.later.as_ref().or(args.bag2.as_ref());
+    let bags: Vec<&Path> =
+        [Some(&args.bag), bag2, args.heldout.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
     outputs::check(&args.out, &FILES, args.predictions.as_deref(), &bags)?;
     let topics = args.topics.as_deref().map(TopicMap::read).transpose()?.unwrap_or_default();
     let vehicle = vehicle(args.vehicle.as_deref())?;
     let tires = args.pacejka.as_deref().map(tires).transpose()?;
     let model = args.extended_model.as_deref().map(extended_model).transpose()?;
     // The drive that is explained is the later one, from the model of the earlier one.
-    let subject = args.bag2.as_deref().unwrap_or(&args.bag);
+    let subject = bag2.unwrap_or(&args.bag);
     let usable = |path: &Path| -> anyhow::Result<_> {
         let (sequence, report) = read(path, &topics)?;
         let (sequence, recorded) = for_diagnosis(&sequence, &vehicle)
@@ -143,7 +135,7 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         Ok((sequence, report, recorded))
     };
     let (sequence, report, recorded) = usable(subject)?;
-    let first = args.bag2.as_ref().map(|_| usable(&args.bag)).transpose()?;
+    let first = bag2.map(|_| usable(&args.bag)).transpose()?;
     let held_out = args.heldout.as_deref().map(usable).transpose()?;
     let reading_s = start.elapsed().as_secs_f64();
     let spinner =
@@ -166,19 +158,10 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         Request { held_out: held_out.as_ref().map(|h| &h.0), earlier: earlier.as_ref(), ..alone(&sequence) };
     let result = diagnose(&request, &mut progress)
         .with_context(|| format!("cannot diagnose {}", subject.display()))?;
-    let graded = if args.graded && result.verdict != Verdict::NotIdentifiable {
-        let request = alone(&sequence);
-        Some(
-            graded(&request, first.as_ref().map(|first| &first.0), &mut progress)
-                .context("no graded answer")?,
-        )
-    } else {
-        None
-    };
     spinner.finish_and_clear();
     let diagnosing_s = start.elapsed().as_secs_f64() - reading_s;
     let header = header(subject, &vehicle, &sequence);
-    let compared_with = args.bag2.as_ref().map(|_| file_name(&args.bag));
+    let compared_with = bag2.map(|_| file_name(&args.bag));
     let mut notes = [read_notes(&report), signal_notes(&recorded)].concat();
     for (path, beside) in [(Some(&args.bag), &first), (args.heldout.as_ref(), &held_out)] {
         if let (Some(path), Some((_, report, recorded))) = (path, beside) {
@@ -200,7 +183,6 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         data_notes: &notes,
         checks: &recorded.checks.checks,
         signals: SignalsOf::new(&recorded),
-        graded: graded.as_ref(),
     };
     let timing = Timing { reading_s, diagnosing_s, total_s: start.elapsed().as_secs_f64() };
     let texts = [
@@ -220,9 +202,6 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         println!("compared   {} with {before}", file_name(subject));
     }
     print!("{}", gap_text(&result, compared_with.as_deref(), &notes));
-    if let Some(graded) = &graded {
-        print!("{}", graded_text(graded));
-    }
     let names: Vec<&str> = files.iter().map(|f| f.0).collect();
     println!("files      {} ({})", args.out.display(), names.join(", "));
     if let Some(path) = &args.predictions {

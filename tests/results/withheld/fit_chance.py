@@ -1,83 +1,87 @@
 #!/usr/bin/env python3
-"""The chance that an effect found is the cause: fits the coefficients of nodes/lib/diagnosis/src/confidence.rs on development_claims.csv, and scores
-every track with a fit on the others. Needs NumPy and scikit-learn.
+"""The chance that an effect which is left in the model is a cause: fits the coefficients `CHANCE` of nodes/lib/diagnosis/src/decisions.rs on
+development cases whose labels are open, scores every batch by a fit on the others, and writes development_effects.csv. Needs NumPy.
 
-    fit_chance.py
+    fit_chance.py LABELS VERDICTS [LABELS VERDICTS ...]      LABELS of `gripsight withheld make`, VERDICTS of `gripsight withheld diagnose`
+    fit_chance.py                                            on development_effects.csv
+
+Effects that are small beside what of the unexplained looks like them (`LEAST_OVER_UNEXPLAINED`) are in the table and not in the fit: the verdict
+names none of them. A cause is an effect that was put in, or that the plant contains by its equations. Recorded cars' own effects nobody knows: they are left out.
 """
 
 import csv
-from collections import defaultdict
+import json
+import sys
 from pathlib import Path
 
 import numpy as np
-from sklearn.linear_model import LogisticRegression
-from sklearn.metrics import log_loss, roc_auc_score
 
-SIGNS = ["ln_share", "ln_drift", "twins", "untried_own_room_steps", "tire_shift", "along", "doubtful_beside"]
-# From this share of what an effect explains another one beside it counts in full.
-COUNTS = 0.1
-# The chances that the doubt about others rests on are those of the same fit: it settles within a few rounds.
-ROUNDS = 6
-
-
-def signs(row):
-    number = {name: float(row[name]) for name in row if name not in ("batch_track", "case", "kind", "effect")}
-    steps = np.clip((number["left_in_its_room"] - 0.02) / 0.03, 0.0, 3.0)
-    return [
-        np.log(number["left"] / number["explained"] + 0.01),
-        np.log(number["drift"] + 0.05),
-        number["twins"],
-        steps if number["untried"] else 0.0,
-        min(number["tire_shift"], 4.0),
-        number["along"],
-    ]
+TABLE = Path(__file__).with_name("development_effects.csv")
+HEAD = ["batch", "case", "kind", "effect", "cause", "needed_fraction", "size_over_half_width", "over_unexplained"]
+# Shares and widths at which a sign counts nothing.
+UNITS = [0.025, 2.5]
+# What is less is as good as nothing.
+LEAST = [1e-3, 0.1]
+RIDGE = 0.1
+# Chance from which the verdict names an effect.
+NAMED = 0.6
+LEAST_OVER_UNEXPLAINED = 0.5
 
 
-def doubtful_beside(rows, alone):
-    cases = defaultdict(list)
-    for i, row in enumerate(rows):
-        cases[row["batch_track"], row["case"]].append(i)
-    explained = [float(row["explained"]) for row in rows]
-    doubt = np.zeros(len(rows))
-    for found in cases.values():
-        for i in found:
-            doubt[i] = sum((1 - alone[j]) * min(1.0, explained[j] / explained[i] / COUNTS) for j in found if j != i)
-    return doubt
+def collected(batches):
+    for labels, verdicts in batches:
+        for case in json.loads(Path(labels).read_text())["cases"]:
+            path = Path(verdicts) / case["case"] / "gap.json"
+            if case["family"] == "recorded" or not path.exists():
+                continue
+            causes = {e["name"] for e in case["effects"]} | set(case["contained"])
+            for effect in json.loads(path.read_text()).get("effects", []):
+                if effect["needed_fraction"] is None:
+                    continue
+                over = effect["over_unexplained"]
+                signs = [effect["needed_fraction"], effect["size_over_half_width"], 1e3 if over is None else over]
+                name = Path(labels).stem
+                yield [name, case["case"], case["kind"], effect["name"], int(effect["name"] in causes), *(f"{s:.4g}" for s in signs)]
 
 
-def fitted(rows, table, cause, which):
-    """Coefficients, the constant and all chances of a fit to the rows of `which`."""
-    doubt = np.zeros(len(rows))
-    for _ in range(ROUNDS):
-        full = np.column_stack([table, doubt])
-        mean, scale = full[which].mean(0), full[which].std(0) + 1e-9
-        model = LogisticRegression(C=1.0, max_iter=3000).fit((full[which] - mean) / scale, cause[which])
-        per_sign = model.coef_[0] / scale
-        constant = model.intercept_[0] - per_sign @ mean
-        chance = lambda beside: 1 / (1 + np.exp(-(np.column_stack([table, beside]) @ per_sign + constant)))
-        doubt = doubtful_beside(rows, chance(np.zeros(len(rows))))
-    return per_sign, constant, chance(doubt)
+def signs(rows):
+    values = np.array([[float(v) for v in row[5:7]] for row in rows])
+    return np.column_stack([np.ones(len(rows)), np.log(np.maximum(values, LEAST) / UNITS)])
+
+
+def fitted(x, cause):
+    weights = np.zeros(x.shape[1])
+    for _ in range(50):
+        chance = 1 / (1 + np.exp(-x @ weights))
+        curvature = x.T @ (x * (chance * (1 - chance))[:, None]) + RIDGE * np.eye(len(weights))
+        weights = weights + np.linalg.solve(curvature, x.T @ (cause - chance) - RIDGE * weights)
+    return weights
+
+
+def told(name, chance, cause):
+    named = chance >= NAMED
+    print(f"{name}: {len(cause)} effects, {int(cause.sum())} causes; named {int((named & (cause > 0)).sum())}, "
+          f"not causes {int((named & (cause == 0)).sum())}; log loss {-np.mean(np.log(np.where(cause > 0, chance, 1 - chance))):.3f}")
+    for low, high in [(0, 0.2), (0.2, 0.5), (0.5, 0.8), (0.8, 0.95), (0.95, 1.01)]:
+        inside = (chance >= low) & (chance < high)
+        if inside.any():
+            print(f"    {low:.2f} to {min(high, 1.0):.2f}: {int(inside.sum())}, of these causes {np.mean(cause[inside]):.2f}")
 
 
 def main():
-    with open(Path(__file__).with_name("development_claims.csv"), newline="") as file:
-        rows = list(csv.DictReader(file))
-    table = np.array([signs(row) for row in rows])
-    cause = np.array([row["cause"] == "1" for row in rows])
-    track = np.array([row["batch_track"] for row in rows])
-    chance = np.zeros(len(rows))
-    for name in sorted(set(track)):
-        here = track == name
-        chance[here] = fitted(rows, table, cause, ~here)[2][here]
-    per_sign, constant, _ = fitted(rows, table, cause, np.full(len(rows), True))
-    print(f"{len(rows)} effects found, {cause.sum()} causes, {len(set(track))} tracks")
-    for name, value in zip(SIGNS, per_sign):
-        print(f"{name} {value:.2f}")
-    nothing = constant + per_sign[0] * np.log(0.01) + per_sign[1] * np.log(0.05)
-    print(f"constant {constant:.2f}, odds where nothing speaks against it {nothing:.2f}")
-    print(f"by track: area under the curve {roc_auc_score(cause, chance):.3f}, log loss {log_loss(cause, chance):.3f}, "
-          f"causes at even odds or more {(chance[cause] >= 0.5).sum()} of {cause.sum()}, "
-          f"others {(chance[~cause] >= 0.5).sum()} of {(~cause).sum()}")
+    if len(sys.argv) > 1:
+        rows = list(collected(zip(sys.argv[1::2], sys.argv[2::2])))
+        with TABLE.open("w", newline="") as file:
+            csv.writer(file, lineterminator="\n").writerows([HEAD, *rows])
+    rows = [row for row in list(csv.reader(TABLE.open()))[1:] if float(row[7]) >= LEAST_OVER_UNEXPLAINED]
+    x, cause = signs(rows), np.array([float(row[4]) for row in rows])
+    batch = np.array([row[0] for row in rows])
+    for name in sorted(set(batch)):
+        own = batch == name
+        told(f"{name}, by a fit on the others", 1 / (1 + np.exp(-x[own] @ fitted(x[~own], cause[~own]))), cause[own])
+    weights = fitted(x, cause)
+    told("all, by their own fit", 1 / (1 + np.exp(-x @ weights)), cause)
+    print("CHANCE:", ", ".join(f"{w:.2f}" for w in weights))
 
 
 if __name__ == "__main__":

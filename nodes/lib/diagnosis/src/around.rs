@@ -62,7 +62,7 @@ struct Free {
 
 impl Around<'_, '_> {
     /// The columns that a configuration's model has.
-    fn in_use(&self, chosen: &[usize]) -> Vec<bool> {
+    pub(crate) fn in_use(&self, chosen: &[usize]) -> Vec<bool> {
         let columns = self.columns;
         let mut out = vec![false; columns.len()];
         out[..BASE].fill(true);

@@ -3,13 +3,12 @@
 use gripsight_estimation::{
     Estimate, HORIZON_S, Split, Windows, bootstrap, by_block, interval, mean, of_length, of_picked, split,
 };
-use gripsight_model::{EffectId, ExtendedModel, Flexible, Recording, Room, WINDOW_S};
+use gripsight_model::{EffectId, ExtendedModel, Flexible, Recording, Room};
 use std::collections::BTreeMap;
 
 use crate::engine::Engine;
 use crate::outcome::{GapBudget, GapStep};
 use crate::residual::Residual;
-use crate::select::Round;
 use crate::state::{Nominal, State};
 
 /// Errors of the models on the scored blocks.
@@ -26,7 +25,7 @@ pub(crate) struct Budget {
     pub(crate) floor: Estimate,
     pub(crate) closed: Estimate,
     pub(crate) scored_on: &'static str,
-    /// What the effects found but not named, and the best of those that were not found, would close beside the named.
+    /// What the likeliest of the others would close beside the named.
     candidates: Vec<(EffectId, Estimate)>,
 }
 
@@ -39,10 +38,8 @@ pub(crate) struct Models<'m> {
     pub(crate) null: &'m State,
     /// With the effects named.
     pub(crate) state: &'m State,
-    /// With all that the search found.
-    pub(crate) found: &'m State,
-    /// The look at what else there is beside the effects named.
-    pub(crate) others: &'m Round,
+    /// The likeliest of the others, each with the parameters to begin with.
+    pub(crate) candidates: &'m [(EffectId, Vec<f64>)],
 }
 
 /// What models are scored on: the held-out blocks, or another bag.
@@ -51,7 +48,6 @@ pub(crate) struct Scorer<'a> {
     pub(crate) engine: Engine<'a>,
     pub(crate) windows: Windows,
     scored_on: &'static str,
-    held_out: bool,
 }
 
 impl<'a> Scorer<'a> {
@@ -62,47 +58,32 @@ impl<'a> Scorer<'a> {
                 engine: Engine { recording, ..engine.clone() },
                 windows: of_length(recording, &split(recording, false).training, HORIZON_S),
                 scored_on: "another bag",
-                held_out: true,
             },
             None if windows.held_out.windows.is_empty() => Self {
                 engine: engine.clone(),
                 windows: of_length(engine.recording, &windows.training, HORIZON_S),
                 scored_on: "training blocks (too little data to hold any out)",
-                held_out: false,
             },
             None => Self {
                 engine: engine.clone(),
                 windows: windows.held_out.clone(),
                 scored_on: "held-out blocks",
-                held_out: true,
             },
         }
     }
-
-    /// Mean squared error of a model over the noise.
-    pub(crate) fn error(&self, state: &State) -> f64 {
-        let score = self.engine.score(&state.effects, None, &state.parameters, &self.windows);
-        mean(&by_block(self.engine.recording, &self.windows, &score))
-    }
-
-    /// What sizes are compared on: the held-out data in windows as they are fitted. Nothing where no data are held out.
-    pub(crate) fn apart(&self) -> Option<(&Engine<'a>, Windows)> {
-        self.held_out.then(|| (&self.engine, of_length(self.engine.recording, &self.windows, WINDOW_S)))
-    }
 }
 
-/// Iterations of the fits of the steps between, and of what else was tried: where nothing is named, candidates are all there is to see.
+/// Iterations of the fits of the steps between, and of the other candidates.
 const STEP_ITERATIONS: usize = 7;
-const CANDIDATE_ITERATIONS: [usize; 2] = [4, 20];
-/// How many of the effects that were not found are scored.
-const CANDIDATES: usize = 3;
+/// How many of the other candidates are scored.
+pub(crate) const CANDIDATES: usize = 3;
 /// An interval of a share that is wider says nothing.
 const WIDEST_SHARE: f64 = 2.0;
 
 impl Budget {
     /// Scores the models.
     pub(crate) fn of(engine: &Engine<'_>, scorer: &Scorer<'_>, windows: &Split, models: &Models<'_>) -> Self {
-        let Models { nominal, null, state, found, others } = *models;
+        let Models { nominal, null, state, candidates } = *models;
         let Scorer { engine: scorer, windows: on, scored_on, .. } = scorer;
         let blocks = |effects: &[EffectId], flexible: Option<&Flexible>, p: &[f64]| {
             by_block(scorer.recording, on, &scorer.score(effects, flexible, p, on))
@@ -113,28 +94,28 @@ impl Budget {
             let named = &state.named[..count];
             let values = engine.carry(state, named);
             let step =
-                engine.look(named, &values, Some(state.starts.clone()), &windows.training, STEP_ITERATIONS);
+                engine.fit(named, &values, Some(state.starts.clone()), &windows.training, STEP_ITERATIONS);
             steps.push(blocks(&step.effects, None, &step.parameters));
         }
         if !state.named.is_empty() {
             steps.push(blocks(&state.effects, None, &state.parameters));
         }
-        let unnamed = found.named.iter().filter(|e| !state.named.contains(e)).map(|&e| (e, found));
-        let others = others.refits.iter().filter(|r| !found.named.contains(&r.effect));
-        let candidates = unnamed
-            .chain(others.take(CANDIDATES).map(|r| (r.effect, &r.state)))
-            .filter_map(|(effect, fitted)| {
-                let named = [&state.named[..], &[effect]].concat();
-                let values = engine.carry(fitted, &named);
-                let alone = engine.look(
+        let candidates = candidates
+            .iter()
+            .filter_map(|(effect, own)| {
+                let named = [&state.named[..], &[*effect]].concat();
+                let mut values = engine.carry(state, &named);
+                let from = values.len() - own.len();
+                values[from..].copy_from_slice(own);
+                let beside = engine.fit(
                     &named,
                     &values,
                     Some(state.starts.clone()),
                     &windows.training,
-                    CANDIDATE_ITERATIONS[usize::from(state.named.is_empty())],
+                    STEP_ITERATIONS,
                 );
-                let error = blocks(&alone.effects, None, &alone.parameters);
-                Some((effect, closed(steps.last()?, &error, &retuned)))
+                let error = blocks(&beside.effects, None, &beside.parameters);
+                Some((*effect, closed(steps.last()?, &error, &retuned)))
             })
             .collect();
         let slip = large_slip_rad(engine, null, &windows.training);

@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::decisions;
 use crate::engine::Engine;
 
-use crate::graded::Change;
+use crate::answer::Change;
 use crate::infer::Inferred;
 use crate::outcome::EffectParameter;
 use crate::trust::TireTrust;

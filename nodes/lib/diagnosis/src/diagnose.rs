@@ -1,21 +1,19 @@
 //! The way from a recording to a diagnosis.
 
 use gripsight_estimation::{Windows, split};
-use gripsight_model::{EffectId, HOLD, Need, Recording};
+use gripsight_model::{EffectId, Flexible, HOLD, Need, Recording, Site};
 use gripsight_signals::{DataHealth, StateSequence};
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 
-use crate::budget::{Budget, Models, Scorer, large_slip_rad};
+use crate::budget::{Budget, CANDIDATES, Models, Scorer, large_slip_rad};
 use crate::engine::Engine;
-use crate::outcome::{DetectionLimit, Diagnosis, Invisible, TirePair, Unexplained};
-use crate::rooms::{Left, explained};
-use crate::search::{Found, completed, search, without};
-use crate::select::reweigh;
+use crate::finding::{detection_limits, ranked, sites};
+use crate::infer::{Inferred, infer, linearised};
+use crate::outcome::{Diagnosis, Inference, Invisible, TirePair};
 use crate::state::State;
-use crate::transfer::drifts;
 use crate::trust::TireTrust;
 use crate::usable::{Usable, cannot_tell, refused, usable};
-use crate::verdict::{Claim, Remains, claims, decide, drive_next, looks, rank, record_next};
+use crate::verdict::{decide, drive_next, figures, record_next};
 use crate::{Earlier, ExtendedModelFile, GapError, noise, pictures, place, plausible};
 
 /// What is diagnosed, and with what.
@@ -72,8 +70,10 @@ const GENERIC: [[f64; 8]; 3] = [
     [12.0, 1.5, 1.2, 0.0, 13.0, 1.5, 1.2, 0.0],
     [14.0, 1.5, 1.7, 0.0, 18.0, 1.5, 1.7, 0.0],
 ];
-/// Windows that the search works on, at most.
-pub(crate) const SEARCH_WINDOWS: usize = 70;
+/// Windows that the inference works on, at most.
+const SEARCH_WINDOWS: usize = 70;
+/// Iterations of the fits on all training blocks.
+const FINAL_ITERATIONS: usize = 15;
 
 /// Diagnoses a recording. `progress` is told what is being done, in a few words.
 ///
@@ -83,20 +83,24 @@ pub(crate) const SEARCH_WINDOWS: usize = 70;
 pub fn diagnose(request: &Request<'_>, progress: &mut dyn FnMut(&str)) -> Result<Diagnosis, GapError> {
     let data_health = DataHealth::of(request.sequence)?;
     match usable(request, &data_health) {
-        Ok(usable) => explain(request, usable, data_health, progress),
+        Ok(usable) => Ok(explain(request, usable, data_health, progress)?.0),
         Err(error) if cannot_tell(&error) => Ok(refused(request, &error, data_health)),
         Err(error) => Err(error),
     }
 }
 
-fn explain(
+/// The way of a recording that can tell.
+pub(crate) fn explain(
     request: &Request<'_>,
     usable: Usable,
     data_health: DataHealth,
     progress: &mut dyn FnMut(&str),
-) -> Result<Diagnosis, GapError> {
+) -> Result<(Diagnosis, Inferred), GapError> {
     let Usable { recording, windows } = usable;
     let other = request.held_out.map(|h| Recording::beside(h, Some(&recording))).transpose()?;
+    if request.earlier.is_some_and(|earlier| !earlier.matches(&recording)) {
+        return Err(GapError::Earlier("the two drives do not record the same signals".to_owned()));
+    }
     progress("fitting the tires");
     let (tires, trust) = match request.given_tires() {
         Some(tires) if request.earlier.is_some() => (tires, TireTrust::drive()),
@@ -109,104 +113,81 @@ fn explain(
         (engine.held, engine.usual) = model.parameters()?;
     }
     let nominal = engine.nominal_model();
-    // The search works on a bounded number of windows, the final fit on all.
+    // The inference works on a bounded number of windows, the final fit on all.
     let search_windows = windows.training.thinned(SEARCH_WINDOWS);
-    let blank = engine.blank();
-    let first = engine.look(&[], &blank, None, &search_windows, 25);
-    if !first.finite {
-        return Err(GapError::NotFinite);
-    }
-    reweigh(&mut engine, &first, &search_windows);
-    let null = engine.fit(&[], &first.parameters, Some(first.starts), &search_windows, 15);
-    let Found { state, evidence, first, last, costs } =
-        search(&mut engine, &null, &library, &search_windows, progress);
-    let (null, state) = if search_windows.windows.len() < windows.training.windows.len() {
-        progress("fitting on all training blocks");
-        let on_all = |s: &State| engine.fit(&s.named, &s.parameters, None, &windows.training, 10);
-        (on_all(&null), on_all(&state))
-    } else {
-        (null, state)
-    };
-    progress("looking at what is left, room by room");
-    let slip_rad = large_slip_rad(&engine, &null, &windows.training);
-    let before = Left::by(&engine, &null, &windows.training, slip_rad);
-    let after = Left::where_calm(&engine, &state, &windows.training, slip_rad);
-    let explained = explained(&engine, &state, &windows.training);
-    let noise_is_known = noise::is_known(&recording);
-    let scorer = Scorer::new(&engine, other.as_ref(), &windows);
-    let drifts = drifts(&engine, &state, &windows.training, scorer.apart());
-    let norm = request.earlier.map(|earlier| earlier.left(request)).transpose()?.unwrap_or_default();
-    let remains = Remains {
-        norm: &norm,
-        before: &before,
-        after: &after,
-        explained: &explained,
-        drifts: &drifts,
-        noise_is_known,
-    };
-    let blocks = &windows.training.block;
-    let mut claims = claims(&engine, &evidence, &state, &remains, &library, blocks);
-    // What is no more than a candidate is left out of the model, and what harms where it was not fitted is no more.
-    let model_of = |claims: &[Claim]| {
-        let named: Vec<EffectId> = claims.iter().filter(|c| c.named).map(|c| c.effect).collect();
-        if named.is_empty() {
-            return null.clone();
-        } else if named.len() == state.named.len() {
-            return state.clone();
+    let first = fitted_null(&engine, &search_windows)?;
+    let (inferred, differences) = match request.earlier {
+        None => {
+            let slip_rad = large_slip_rad(&engine, &first, &search_windows);
+            let wheelbase_m = request.vehicle.wheelbase_m();
+            let flexible = Flexible::by_site(&recording, slip_rad, wheelbase_m, &Site::ALL);
+            let scorer = Scorer::new(&engine.clone(), other.as_ref(), &windows);
+            let found = infer(&mut engine, &first, &library, flexible, &search_windows, &scorer, progress);
+            (found.ok_or(GapError::NotFinite)?, None)
         }
-        let values = engine.carry(&state, &named);
-        engine.fit(&named, &values, Some(state.starts.clone()), &windows.training, 10)
+        Some(earlier) => {
+            progress("comparing the drives");
+            // Both drives in the same columns, around the same tires, with nothing held.
+            let like = &earlier.inferred;
+            let mut alike = Engine::new(&recording, request.vehicle, like.tires, TireTrust::file());
+            let null = fitted_null(&alike, &search_windows)?;
+            let later = linearised(&mut alike, &null, like, &search_windows).ok_or(GapError::NotFinite)?;
+            engine.sigma = alike.sigma.clone();
+            let differences = earlier.compared(&alike, &later).ok_or(GapError::NotFinite)?;
+            (later, Some((earlier, differences)))
+        }
     };
-    let mut model = model_of(&claims);
-    let with = scorer.error(&model);
-    let mut harm = false;
-    for claim in claims.iter_mut().filter(|claim| claim.is_unsure()) {
-        let simpler = without(&engine, &model, claim.effect, &windows.training);
-        harm |= claim.doubt_if_harmful(with, scorer.error(&simpler));
-    }
-    if harm {
-        model = model_of(&claims);
-    }
-    let named = &model.named;
-    claims.iter_mut().for_each(|claim| claim.with_company(&engine, &model, &windows.training));
+    progress("fitting on all training blocks");
+    let (named, candidates) = match &differences {
+        Some((_, differences)) => (differences.accepted.clone(), differences.candidates()),
+        None => (inferred.accepted(), inferred.candidates()),
+    };
+    let size = |effect: EffectId| match &differences {
+        Some((earlier, differences)) => differences.size(earlier, effect).0,
+        None => inferred.size(effect).0,
+    };
+    let null = engine.fit(&[], &first.parameters, None, &windows.training, FINAL_ITERATIONS);
+    let model = if named.is_empty() {
+        null.clone()
+    } else {
+        let mut values = engine.carry(&null, &named);
+        let own: Vec<f64> = named.iter().flat_map(|e| size(*e)).collect();
+        let from = values.len() - own.len();
+        values[from..].copy_from_slice(&own);
+        engine.fit(&named, &values, Some(null.starts.clone()), &windows.training, FINAL_ITERATIONS)
+    };
     progress("scoring on held-out data");
-    // What else there is stands beside what is named.
-    let others = if named.is_empty() { &completed(&engine, first, &search_windows) } else { &last };
-    let models = Models { nominal: &nominal, null: &null, state: &model, found: &state, others };
+    let scorer = Scorer::new(&engine, other.as_ref(), &windows);
+    let candidates: Vec<(EffectId, Vec<f64>)> =
+        candidates.into_iter().take(CANDIDATES).map(|e| (e, size(e))).collect();
+    let models = Models { nominal: &nominal, null: &null, state: &model, candidates: &candidates };
     let budget = Budget::of(&engine, &scorer, &windows, &models);
-    let (verdict, mut reasons) = decide(&budget, &claims, &remains, &costs);
+    let (verdict, mut reasons) = match &differences {
+        Some((_, differences)) => (differences.verdict(), figures(&budget, named.is_empty())),
+        None => decide(&budget, &inferred, &library),
+    };
     // What cannot be right comes right after the errors: it explains more than any effect.
     reasons.splice(1..1, plausible::doubts(&recording, request.vehicle));
     reasons.extend(held_command(null.parameters[HOLD]));
-    reasons.extend(request.earlier.map(|earlier| earlier.text()));
+    reasons.extend(request.earlier.map(Earlier::text));
     reasons.extend(noise::caveat(&recording));
-    let effects = rank(&engine, &claims, [&model, &state], blocks, others, &budget);
+    let effects = match &differences {
+        Some((earlier, differences)) => differences.ranked(earlier, &engine, &budget),
+        None => ranked(&engine, &inferred, &library, &budget),
+    };
     let scored_windows =
         if windows.held_out.windows.is_empty() { &windows.training } else { &windows.held_out };
     let on_all = split(&recording, false).training;
     let nominal_score = engine.score(&nominal.effects, None, &nominal.parameters, &on_all);
-    let detection_limits = last
-        .screening
-        .candidates
-        .iter()
-        .flat_map(|c| {
-            c.effect
-                .spec()
-                .parameters
-                .iter()
-                .take(c.effect.sizing())
-                .zip(&c.error)
-                .map(|(p, e)| DetectionLimit { name: c.effect.name(), parameter: p.name, size: 5.0 * e })
-        })
-        .filter(|l| l.size.is_finite())
-        .collect();
-    Ok(Diagnosis {
+    let diagnosis = Diagnosis {
         verdict,
         reasons,
         drive_next: [drive_next(&effects), record_next(verdict, &invisible)].concat(),
         effects,
+        sites: sites(&inferred),
+        changes: differences.map(|(_, d)| d.changes).unwrap_or_default(),
         invisible,
-        detection_limits,
+        detection_limits: detection_limits(&inferred),
         places: place::places(&engine, &nominal, &on_all, &nominal_score),
         identities: recording.identities.clone(),
         gap: budget.stated(&recording),
@@ -214,16 +195,17 @@ fn explain(
         tires: TirePair { without_effect: null.tires(), with_effect: model.tires() },
         extended_model: ExtendedModelFile::of(&engine, &model),
         data_health,
-        looks: looks(&engine, &evidence, &last, &state),
-        search_costs: costs,
-        unexplained: Unexplained {
-            cost: [before.cost, after.cost],
-            explained: state.named.iter().map(|e| e.name()).zip(explained.iter().copied()).collect(),
-            drift: state.named.iter().map(|e| e.name()).zip(drifts.iter().copied()).collect(),
-            rooms: before.gains.iter().zip(&after.gains).map(|(b, a)| (b.0.name(), [b.1, a.1])).collect(),
-        },
+        inference: Some(Inference { rounds: inferred.rounds, dispersion: inferred.dispersion }),
         series: pictures::series(&engine, &nominal, &null, &model, &on_all, &nominal_score, scored_windows),
-    })
+    };
+    Ok((diagnosis, inferred))
+}
+
+/// Tires and background fitted, nothing else.
+fn fitted_null(engine: &Engine<'_>, windows: &Windows) -> Result<State, GapError> {
+    const ITERATIONS: usize = 30;
+    let null = engine.fit(&[], &engine.blank(), None, windows, ITERATIONS);
+    if null.finite { Ok(null) } else { Err(GapError::NotFinite) }
 }
 
 /// A sentence where the steering is so late by its hold alone that one could take it for a delay.
@@ -251,13 +233,13 @@ pub(crate) fn fit_tires(
         .map(|&start| {
             let engine =
                 Engine::new(recording, vehicle, PacejkaParameters::from_array(start), TireTrust::free());
-            let state = engine.look(&[], &engine.blank(), None, &windows, FIRST);
+            let state = engine.fit(&[], &engine.blank(), None, &windows, FIRST);
             (engine, state)
         })
         .filter(|(_, state)| state.finite)
         .min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
     let (engine, state) = best.ok_or(GapError::NotFinite)?;
-    let state = engine.look(&[], &state.parameters, Some(state.starts), &windows, REST);
+    let state = engine.fit(&[], &state.parameters, Some(state.starts), &windows, REST);
     if state.finite { Ok(state.tires()) } else { Err(GapError::NotFinite) }
 }
 

@@ -1,56 +1,137 @@
 //! A drive from before: what a later one of the same car is compared with.
 
-use crate::budget::large_slip_rad;
+use gripsight_model::{EffectId, Recording};
+
+use crate::answer::Change;
+use crate::budget::Budget;
+use crate::changes::{Compared, compare};
+use crate::decisions;
+use crate::diagnose::explain;
 use crate::engine::Engine;
-use crate::outcome::Diagnosis;
-use crate::rooms::Left;
+use crate::infer::Inferred;
+use crate::outcome::{Diagnosis, RankedEffect};
+use crate::sizes::{Sized, reported};
 use crate::trust::TireTrust;
-use crate::{GapError, Request, Verdict, diagnose};
-use gripsight_estimation::{Windows, split};
-use gripsight_model::Recording;
+use crate::usable::usable;
+use crate::{GapError, Request, Verdict};
+use gripsight_signals::DataHealth;
 
 /// A drive from before with its own diagnosis. A later drive is compared with all that was found in it: tires, effects, and what they left.
 #[derive(Debug, Clone)]
 pub struct Earlier {
     /// What it was explained with.
     pub diagnosis: Diagnosis,
+    pub(crate) inferred: Inferred,
     recording: Recording,
-    windows: Windows,
 }
 
 impl Earlier {
-    /// Diagnoses the drive from before; `request` as of a drive of its own. `progress` as of [`diagnose`].
+    /// Diagnoses the drive from before; `request` as of a drive of its own. `progress` as of [`diagnose`](crate::diagnose).
     ///
     /// # Errors
-    /// Those of [`diagnose`], and [`GapError::Earlier`] where its data cannot tell.
+    /// Those of [`diagnose`](crate::diagnose), and [`GapError::Earlier`] where its data cannot tell.
     pub fn diagnosed(request: &Request<'_>, progress: &mut dyn FnMut(&str)) -> Result<Self, GapError> {
-        let diagnosis = diagnose(request, progress)?;
+        let data_health = DataHealth::of(request.sequence)?;
+        let usable = usable(request, &data_health).map_err(|e| GapError::Earlier(e.to_string()))?;
+        let recording = usable.recording.clone();
+        let (diagnosis, inferred) = explain(request, usable, data_health, progress)?;
         if diagnosis.verdict == Verdict::NotIdentifiable {
             return Err(GapError::Earlier(diagnosis.reasons.join("; ")));
         }
-        let recording = Recording::new(request.sequence)?;
-        let windows = split(&recording, false).training.thinned(WINDOWS);
-        Ok(Self { diagnosis, recording, windows })
+        Ok(Self { diagnosis, inferred, recording })
     }
 
     /// What it was explained with, in words.
     pub(crate) fn text(&self) -> String {
         let named: Vec<&str> = self.diagnosis.effects.iter().filter(|e| e.accepted).map(|e| e.name).collect();
         let of = if named.is_empty() { "tires alone".to_owned() } else { named.join(", ") };
-        format!("the drive before is explained by {of}, left as they were but for what is named here")
+        format!(
+            "the drive before is explained by {of}; what either drive leaves is in both, and only differences count"
+        )
     }
 
-    /// What its model leaves of it, room by room.
-    pub(crate) fn left(&self, request: &Request<'_>) -> Result<Left, GapError> {
-        let model = &self.diagnosis.extended_model;
-        let mut engine = Engine::new(&self.recording, request.vehicle, model.tires, TireTrust::drive());
-        (engine.held, engine.usual) = model.parameters()?;
-        let state = engine.look(&[], &engine.blank(), None, &self.windows, ITERATIONS);
-        let slip_rad = large_slip_rad(&engine, &state, &self.windows);
-        Ok(Left::by(&engine, &state, &self.windows, slip_rad))
+    /// Whether another recording holds the same signals.
+    pub(crate) fn matches(&self, later: &Recording) -> bool {
+        self.recording.channels == later.channels && self.recording.has_command == later.has_command
+    }
+
+    /// What differs in a later drive that was linearised in the same columns.
+    pub(crate) fn compared(&self, later: &Engine<'_>, inferred: &Inferred) -> Option<Differences> {
+        let engine = Engine::new(&self.recording, later.vehicle, self.inferred.tires, TireTrust::drive());
+        let compared = compare(&engine, &self.inferred, inferred)?;
+        let changes = compared.changes(&self.inferred);
+        let mut accepted: Vec<EffectId> = changes
+            .iter()
+            .filter(|c| {
+                c.probability >= decisions::LIKELY && !(c.difference.low <= 0.0 && c.difference.high >= 0.0)
+            })
+            .filter_map(|c| EffectId::by_name(c.name))
+            .collect();
+        accepted.dedup();
+        Some(Differences { compared, changes, accepted })
     }
 }
 
-/// Windows that its model is looked at on, at most, and iterations of the fit of their starts.
-const WINDOWS: usize = 70;
-const ITERATIONS: usize = 10;
+/// What differs between two drives.
+#[derive(Debug, Clone)]
+pub(crate) struct Differences {
+    compared: Compared,
+    pub(crate) changes: Vec<Change>,
+    /// The effects that have changed, the likeliest first: likelier than not, and by an amount whose interval holds no zero.
+    pub(crate) accepted: Vec<EffectId>,
+}
+
+impl Differences {
+    /// An effect's parameters in the later drive, with the standard deviations of the differences.
+    pub(crate) fn size(&self, earlier: &Earlier, effect: EffectId) -> Sized {
+        let before = self.compared.earlier(&earlier.inferred, effect).unwrap_or_default();
+        let (by, sigma) = self.compared.difference(&earlier.inferred, effect).unwrap_or_default();
+        (before.iter().zip(&by).map(|(b, d)| b + d).collect(), sigma)
+    }
+
+    /// The effects that have changed, then those that may have.
+    pub(crate) fn ranked(
+        &self,
+        earlier: &Earlier,
+        engine: &Engine<'_>,
+        budget: &Budget,
+    ) -> Vec<RankedEffect> {
+        let of = |effect: EffectId, closed| RankedEffect {
+            name: effect.name(),
+            accepted: self.accepted.contains(&effect),
+            parameters: reported(engine, effect, &self.size(earlier, effect)),
+            gap_closed_fraction: closed,
+            needed_fraction: f64::NAN,
+            held_out_log_ratio: f64::NAN,
+            over_unexplained: f64::NAN,
+            size_over_half_width: f64::NAN,
+            confidence: self.compared.of_effect(&earlier.inferred, effect),
+            confused_with: Vec::new(),
+        };
+        let mut out: Vec<RankedEffect> =
+            (self.accepted.iter().enumerate()).map(|(i, e)| of(*e, budget.closed_by_step(i + 1))).collect();
+        out.extend(self.candidates().into_iter().map(|e| of(e, budget.closed_by_candidate(e))));
+        out
+    }
+
+    /// The other effects that are worth a word, the likeliest first.
+    pub(crate) fn candidates(&self) -> Vec<EffectId> {
+        let all = self.changes.iter().filter_map(|c| EffectId::by_name(c.name));
+        all.filter(|e| !self.accepted.contains(e)).collect()
+    }
+
+    /// The verdict: effects where some have changed, other tires, something that the library lacks, or nothing.
+    pub(crate) fn verdict(&self) -> Verdict {
+        let likely =
+            |name: &str| self.changes.iter().any(|c| c.name == name && c.probability >= decisions::LIKELY);
+        if !self.accepted.is_empty() {
+            Verdict::Effects
+        } else if likely("other") {
+            Verdict::NoneOfThese
+        } else if likely("tires") {
+            Verdict::TireRetuneOnly
+        } else {
+            Verdict::NoGap
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! One engine for everything that is fitted or scored: the extended model on windows with free starts.
 
 use gripsight_estimation::shooting;
-use gripsight_estimation::shooting::{Descent, Fit, Linearization, Parameter, Problem, StopReason};
+use gripsight_estimation::shooting::{Parameter, Problem, StopReason};
 use gripsight_estimation::{Score, Windows};
 use gripsight_model::{
     BASE, EffectId, ExtendedModel, Flexible, ParameterSpec, Recording, Window, tires_to_parameters,
@@ -176,55 +176,18 @@ impl<'a> Engine<'a> {
         windows: &Windows,
         max_iterations: usize,
     ) -> State {
-        self.fitted(named, values, windows, max_iterations, |problem| {
-            let fit = shooting::fit(problem, starts);
-            let end = Descent {
-                parameters: fit.parameters.clone(),
-                starts: fit.starts.clone(),
-                at: fit.linearization.evaluation(),
-                stop: fit.stop,
-                iterations: fit.iterations,
-            };
-            (end, Some(Box::new(fit)))
-        })
-    }
-
-    /// [`Self::fit`] without the derivatives at its end.
-    pub(crate) fn look(
-        &self,
-        named: &[EffectId],
-        values: &[f64],
-        starts: Option<Vec<[f64; 2]>>,
-        windows: &Windows,
-        max_iterations: usize,
-    ) -> State {
-        let descend = |problem: &Problem<'_, _>| (shooting::descend(problem, starts), None);
-        self.fitted(named, values, windows, max_iterations, descend)
-    }
-
-    fn fitted(
-        &self,
-        named: &[EffectId],
-        values: &[f64],
-        windows: &Windows,
-        max_iterations: usize,
-        solve: impl FnOnce(&Problem<'_, ExtendedModel<'a>>) -> (Descent, Option<Box<Fit>>),
-    ) -> State {
         let effects = self.layout(named);
         let model = self.model(&effects, None);
         let parameters = self.parameters(named, &effects, values, 1.0);
-        let (end, fit) = solve(&self.problem(&model, &windows.windows, &parameters, max_iterations));
+        let problem = self.problem(&model, &windows.windows, &parameters, max_iterations);
+        let end = shooting::descend(&problem, starts);
         State {
             named: named.to_vec(),
             effects,
-            free: (0..parameters.len()).filter(|&j| parameters[j].free).collect(),
             parameters: end.parameters,
             starts: end.starts,
             cost: end.at.cost,
-            window_costs: end.at.window_costs,
-            residuals: end.at.residuals as f64,
             finite: end.stop != StopReason::NotFinite,
-            fit,
         }
     }
 
@@ -234,15 +197,6 @@ impl<'a> Engine<'a> {
             return state.starts.clone();
         }
         self.score(&state.effects, None, &state.parameters, windows).starts
-    }
-
-    /// The cost of a state, per residual, as this engine counts it.
-    pub(crate) fn cost(&self, state: &State, windows: &Windows) -> f64 {
-        let model = self.model(&state.effects, None);
-        let parameters = self.parameters(&state.named, &state.effects, &state.parameters, 1.0);
-        let problem = self.problem(&model, &windows.windows, &parameters, 0);
-        let at = shooting::evaluate(&problem, &state.parameters, &state.starts);
-        at.cost / at.residuals as f64
     }
 
     /// Fits flexible terms on top of a state, whose own parameters stay: an upper bound of what an additive term explains.
@@ -256,37 +210,6 @@ impl<'a> Engine<'a> {
         parameters[..own].iter_mut().for_each(|p| p.free = false);
         let problem = self.problem(&model, &windows.windows, &parameters, STEPS);
         shooting::descend(&problem, Some(state.starts.clone())).parameters
-    }
-
-    /// One Jacobian of all parameters of a model.
-    pub(crate) fn linearize(
-        &self,
-        named: &[EffectId],
-        effects: &[EffectId],
-        values: &[f64],
-        starts: &[[f64; 2]],
-        windows: &Windows,
-    ) -> Linearization {
-        let model = self.model(effects, None);
-        let parameters = self.parameters(named, effects, values, 1.0);
-        shooting::linearize(&self.problem(&model, &windows.windows, &parameters, 0), values, starts)
-    }
-
-    /// Half the derivative of the cost by one parameter of a model, and the information on it, all others fixed.
-    pub(crate) fn slope(
-        &self,
-        effects: &[EffectId],
-        values: &[f64],
-        place: usize,
-        starts: &[[f64; 2]],
-        windows: &Windows,
-    ) -> (f64, f64) {
-        let model = self.model(effects, None);
-        let mut parameters = self.parameters(effects, effects, values, 1.0);
-        parameters.iter_mut().enumerate().for_each(|(j, p)| p.free = j == place);
-        let problem = self.problem(&model, &windows.windows, &parameters, 0);
-        let here = shooting::linearize(&problem, values, starts);
-        (here.gradient[0], here.information[(0, 0)])
     }
 
     /// Best starts for fixed parameters, and the plain sum of squares of each window in units of the noise.

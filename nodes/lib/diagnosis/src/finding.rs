@@ -1,58 +1,101 @@
-//! From probabilities to statements: how likely each effect is, what the data cannot tell apart, how large each is, and the answer by site.
+//! From probabilities to statements: how likely each effect is, what the data cannot tell apart, and the answer by site.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 use gripsight_estimation::selection::{Term, configuration};
 use gripsight_estimation::{Estimate, bootstrap};
-use gripsight_model::{EffectId, Recording, Site};
-use gripsight_vehicle::VehicleParameters;
+use gripsight_model::{EffectId, Site};
 use nalgebra::DVector;
 
+use crate::answer::{MechanismAnswer, SiteAnswer};
+use crate::budget::Budget;
 use crate::decisions;
 use crate::engine::Engine;
-use crate::graded::{MechanismAnswer, SiteAnswer, SizedEffect};
 use crate::infer::Inferred;
-use crate::outcome::EffectParameter;
-use crate::trust::TireTrust;
+use crate::outcome::{DetectionLimit, RankedEffect};
+use crate::sizes::reported;
 
-/// Half width of a 90 % interval in standard deviations.
-const NINETY: f64 = 1.645;
 /// Probability of one effect, where another one is absent, from which it may stand in its place.
 const IN_ITS_PLACE: f64 = 0.2;
 /// Probability that an effect is absent, below which nothing stands in its place.
 const ABSENT: f64 = 0.02;
 
-/// All effects that are worth a word, the likeliest first.
-pub(crate) fn mechanisms(
-    recording: &Recording,
-    vehicle: &VehicleParameters,
+impl Inferred {
+    /// The effects stated as causes, what closes most first.
+    pub(crate) fn accepted(&self) -> Vec<EffectId> {
+        let closes = |e: &EffectId| self.statement(*e).map_or(0.0, |s| s.closes);
+        let mut out: Vec<EffectId> =
+            self.columns.effects.iter().copied().filter(|e| self.is_accepted(*e)).collect();
+        out.sort_by(|a, b| closes(b).total_cmp(&closes(a)));
+        out
+    }
+
+    /// The other effects that are worth a word, the likeliest first.
+    pub(crate) fn candidates(&self) -> Vec<EffectId> {
+        let listed = |e: &EffectId| {
+            self.is_open(*e) && self.probability(*e) >= decisions::LISTED && !self.is_accepted(*e)
+        };
+        let mut out: Vec<EffectId> = self.columns.effects.iter().copied().filter(listed).collect();
+        out.sort_by(|a, b| self.probability(*b).total_cmp(&self.probability(*a)));
+        out
+    }
+}
+
+/// The ranking: the effects stated, then the other candidates.
+pub(crate) fn ranked(
+    engine: &Engine<'_>,
     inferred: &Inferred,
-) -> Vec<SizedEffect> {
-    let engine = Engine::new(recording, vehicle, inferred.tires, TireTrust::free());
-    let open = inferred.columns.effects.iter().filter(|e| inferred.is_open(**e));
-    let mut out: Vec<SizedEffect> = open
-        .map(|&effect| SizedEffect {
-            name: effect.name(),
-            probability: inferred.probability(effect),
-            accepted: inferred.is_accepted(effect),
-            needed_fraction: inferred.statement(effect).map_or(f64::NAN, |s| s.closes),
-            parameters: sizes(&engine, effect, inferred.size(effect)),
-            confused_with: confused(inferred, effect).iter().map(|e| e.name()).collect(),
-        })
-        .filter(|f| f.probability >= decisions::LISTED)
-        .collect();
-    out.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    library: &[EffectId],
+    budget: &Budget,
+) -> Vec<RankedEffect> {
+    let of = |effect: EffectId, accepted: bool, closed: Estimate| RankedEffect {
+        name: effect.name(),
+        accepted,
+        parameters: reported(engine, effect, &inferred.size(effect)),
+        gap_closed_fraction: closed,
+        needed_fraction: inferred.statement(effect).map_or(f64::NAN, |s| s.closes),
+        held_out_log_ratio: inferred.statement(effect).map_or(f64::NAN, |s| s.held_out_log_ratio),
+        over_unexplained: inferred.statement(effect).map_or(f64::NAN, |s| s.over_unexplained),
+        size_over_half_width: inferred.statement(effect).map_or(f64::NAN, |s| s.size_over_half_width),
+        confidence: inferred.probability(effect),
+        confused_with: confused(inferred, library, effect).iter().map(|e| e.name()).collect(),
+    };
+    let stated = inferred.accepted().into_iter().enumerate();
+    let mut out: Vec<RankedEffect> = stated.map(|(i, e)| of(e, true, budget.closed_by_step(i + 1))).collect();
+    out.extend(inferred.candidates().into_iter().map(|e| of(e, false, budget.closed_by_candidate(e))));
     out
 }
 
+/// Sizes from which effects would show beside the most probable model: five standard deviations.
+pub(crate) fn detection_limits(inferred: &Inferred) -> Vec<DetectionLimit> {
+    const STANDARD_DEVIATIONS: f64 = 5.0;
+    let problem = &inferred.weighed.total;
+    let of = |&effect: &EffectId| {
+        let term = inferred.term_of(effect)?;
+        let mut chosen = inferred.selection.best.clone();
+        chosen[term] = inferred.terms[term].log_weights.len() - 1;
+        let covariance = configuration(problem, inferred.dispersion, &inferred.terms, &chosen)?.covariance;
+        let from = inferred.terms[term].from;
+        let parameters = effect.spec().parameters.iter().take(effect.sizing()).enumerate();
+        let limit = |(i, p): (usize, &gripsight_model::ParameterSpec)| DetectionLimit {
+            name: effect.name(),
+            parameter: p.name,
+            size: STANDARD_DEVIATIONS * covariance[(from + i, from + i)].max(0.0).sqrt(),
+        };
+        Some(parameters.map(limit).collect::<Vec<_>>())
+    };
+    let open = inferred.columns.effects.iter().filter(|e| inferred.is_open(**e));
+    open.filter_map(of).flatten().filter(|l| l.size.is_finite()).collect()
+}
+
 /// What is there where an effect is not.
-fn confused(inferred: &Inferred, effect: EffectId) -> Vec<EffectId> {
+fn confused(inferred: &Inferred, library: &[EffectId], effect: EffectId) -> Vec<EffectId> {
+    let mut out: Vec<EffectId> = untried(effect, library).collect();
     let visited = &inferred.selection.visited;
-    let Some(own) = inferred.term_of(effect) else { return Vec::new() };
+    let Some(own) = inferred.term_of(effect) else { return out };
     let without: Vec<&Vec<u8>> = visited.iter().filter(|c| c[own] == 0).collect();
     if without.is_empty() || (without.len() as f64) < ABSENT * visited.len() as f64 {
-        return Vec::new();
+        return out;
     }
     let with: Vec<&Vec<u8>> = visited.iter().filter(|c| c[own] > 0).collect();
     let share = |of: &[&Vec<u8>], term: usize| {
@@ -63,58 +106,13 @@ fn confused(inferred: &Inferred, effect: EffectId) -> Vec<EffectId> {
             .term_of(*e)
             .is_some_and(|t| share(&without, t) >= IN_ITS_PLACE && share(&with, t) < 0.5 * share(&without, t))
     };
-    inferred.columns.effects.iter().copied().filter(|e| *e != effect && instead(e)).collect()
+    out.extend(inferred.columns.effects.iter().copied().filter(|e| *e != effect && instead(e)));
+    out
 }
 
-/// Parameters as reported, with 90 % intervals.
-fn sizes(
-    engine: &Engine<'_>,
-    effect: EffectId,
-    (own, sigma): (Vec<f64>, Vec<f64>),
-) -> BTreeMap<&'static str, EffectParameter> {
-    let spec = effect.spec();
-    let recording = engine.recording;
-    let halves: Vec<f64> = own
-        .iter()
-        .zip(&sigma)
-        .zip(spec.parameters)
-        .map(|((v, s), p)| {
-            NINETY * s.hypot(spec.unknown.sigma(v - p.null, recording.dt_s(), recording.typical_speed_mps()))
-        })
-        .collect();
-    let given = engine.given(effect);
-    if spec.reported.is_empty() {
-        return spec
-            .parameters
-            .iter()
-            .enumerate()
-            .map(|(i, p)| {
-                let (value, half) = (own[i], halves[i]);
-                let before = given.map(|given| given[i]);
-                (
-                    p.name,
-                    EffectParameter { value, low: value - half, high: value + half, unit: p.unit, before },
-                )
-            })
-            .collect();
-    }
-    spec.reported
-        .iter()
-        .map(|r| {
-            let value = (r.value)(&own);
-            // Ends from moving each fitted parameter by its own interval.
-            let (mut low, mut high) = (value, value);
-            for i in 0..own.len() {
-                for sign in [-1.0, 1.0] {
-                    let mut moved = own.clone();
-                    moved[i] += sign * if halves[i].is_finite() { halves[i] } else { 0.0 };
-                    let v = (r.value)(&moved);
-                    (low, high) = (low.min(v), high.max(v));
-                }
-            }
-            (r.name, EffectParameter { value, low, high, unit: r.unit, before: given.map(r.value) })
-        })
-        .collect()
+/// What does nearly the same as an effect and is not among the candidates: a name is shared with it.
+pub(crate) fn untried(effect: EffectId, library: &[EffectId]) -> impl Iterator<Item = EffectId> {
+    effect.spec().alike.iter().copied().filter(|e| !library.contains(e))
 }
 
 /// The graded answer: how likely each site is at fault, what it closes, and which mechanisms there.

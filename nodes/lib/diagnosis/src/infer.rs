@@ -16,10 +16,12 @@ use crate::around::{Around, Pruned};
 use crate::budget::Scorer;
 use crate::decisions;
 use crate::engine::Engine;
+use crate::finding::untried;
 use crate::hypotheses::terms;
 use crate::joint::{Columns, Joint, Weighed};
+use crate::sizes::{Sized, Sizes, told};
 use crate::state::State;
-use crate::stated::Statement;
+use crate::stated::{Stated, Statement};
 use gripsight_estimation::Windows;
 use gripsight_estimation::selection::{Configuration, Quadratic, Selection, Term, configuration, select};
 use gripsight_model::BASE;
@@ -35,10 +37,14 @@ pub(crate) struct Inferred {
     /// Where everything was linearised last.
     pub(crate) values: Vec<f64>,
     pub(crate) selection: Selection,
-    /// The effects of the most probable model that data held out need.
-    pub(crate) stated: Vec<Statement>,
+    /// The configuration that is left in the end.
+    pub(crate) chosen: Vec<usize>,
+    /// Its effects; `None` where held-out data were not asked.
+    pub(crate) stated: Option<Vec<Statement>>,
     /// Probability that each term matters, confirmed by rollouts.
     pub(crate) confirmed: Vec<f64>,
+    /// The most probable model's parameters.
+    pub(crate) sizes: Sizes,
     pub(crate) terms: Vec<Term>,
     pub(crate) weighed: Weighed,
     /// How many times the errors' information is smaller than if they were independent.
@@ -85,6 +91,8 @@ pub(crate) fn infer(
     let mut rounds = 0;
     let mut open_flexible = false;
     let mut needless = vec![false; FIRST + columns.len()];
+    // The best of effects alone.
+    let mut closed: Option<Vec<usize>> = None;
     loop {
         rounds += 1;
         progress(&format!("comparing all models, round {rounds}"));
@@ -140,19 +148,32 @@ pub(crate) fn infer(
         if (same && open_flexible && rounds > NOISE_ROUNDS) || last {
             let confirmed = around.confirmed(&weighed.total, &selection, &losses)?;
             progress("asking data that nothing was fitted to");
-            let stated = around.stated(&weighed.total, best, fitted, scorer)?;
+            let Stated { chosen: best, fitted, statements: mut stated } =
+                around.stated(&weighed.total, (best, fitted), closed, scorer, &confirmed)?;
+            let sizes = Sizes::of(&around, library, &best, &fitted, windows)?;
+            for statement in &mut stated {
+                let effect = columns.effects[statement.term - FIRST];
+                statement.untried = untried(effect, library).count();
+                statement.size_over_half_width =
+                    sizes.effect(&columns, effect).map_or(0.0, |sized| told(engine, effect, &sized));
+            }
             return Some(Inferred {
-                stated,
+                chosen: best,
+                stated: Some(stated),
                 columns,
                 tires: engine.nominal,
                 values,
                 confirmed,
+                sizes,
                 selection,
                 terms,
                 weighed,
                 dispersion,
                 rounds,
             });
+        }
+        if !open_flexible {
+            closed = Some(best.clone());
         }
         open_flexible |= same;
         (values, starts) = (fitted.values, fitted.starts);
@@ -188,12 +209,15 @@ pub(crate) fn linearised(
                 .iter()
                 .map(|p| if p.len() > 1 { p[p.len() - 1] } else { 1.0 })
                 .collect();
+            let sizes = Sizes { sigma: vec![f64::NAN; values.len()], values: values.clone() };
             return Some(Inferred {
-                stated: Vec::new(),
+                chosen: selection.best.clone(),
+                stated: None,
                 columns,
                 tires: engine.nominal,
                 values,
                 confirmed,
+                sizes,
                 selection,
                 terms,
                 weighed,
@@ -251,7 +275,9 @@ impl Inferred {
     /// Probability that something is the matter at a site that no effect of the library does.
     pub(crate) fn other(&self, site: Site) -> f64 {
         let terms = self.terms_of_site(site);
-        self.selection.probability_that(|c| c[terms.clone()].iter().any(|&a| a > 0))
+        let by_fit = self.selection.probability_that(|c| c[terms.clone()].iter().any(|&a| a > 0));
+        let needed = self.chosen[terms].iter().any(|&a| a > 0);
+        if needed { by_fit } else { by_fit.min(decisions::NEEDLESS) }
     }
 
     /// Whether the data were asked for an effect.
@@ -259,21 +285,29 @@ impl Inferred {
         self.term_of(effect).is_some_and(|t| self.terms[t].log_weights.len() > 1)
     }
 
-    /// Probability that an effect matters.
+    /// Probability that an effect matters: the chance that it is a cause where it is left in the model, that of the fit where held-out data were not
+    /// asked.
     pub(crate) fn probability(&self, effect: EffectId) -> f64 {
-        self.term_of(effect).filter(|_| self.is_open(effect)).map_or(0.0, |t| self.confirmed[t])
+        let by_fit = self.term_of(effect).filter(|_| self.is_open(effect)).map_or(0.0, |t| self.confirmed[t]);
+        match (&self.stated, self.statement(effect)) {
+            (_, Some(statement)) => statement.chance(),
+            (Some(_), None) => by_fit.min(decisions::NEEDLESS),
+            (None, None) => by_fit,
+        }
     }
 
     /// What is stated of an effect, if it is in the model.
     pub(crate) fn statement(&self, effect: EffectId) -> Option<&Statement> {
         let term = self.term_of(effect).filter(|_| self.is_open(effect))?;
-        self.stated.iter().find(|s| s.term == term)
+        self.stated.as_ref()?.iter().find(|s| s.term == term)
     }
 
-    /// Whether an effect is stated as a cause: more likely than not, needed on data held out, and no stand-in for what the library lacks.
+    /// Whether the verdict names an effect: it is likely a cause, and not small beside what of the unexplained looks like it.
     pub(crate) fn is_accepted(&self, effect: EffectId) -> bool {
-        let holds = |s: &Statement| s.beside >= decisions::LEAST_BESIDE;
-        self.probability(effect) >= decisions::LIKELY && self.statement(effect).is_some_and(holds)
+        let holds = |s: &Statement| {
+            s.chance() >= decisions::NAMED && s.over_unexplained >= decisions::LEAST_OVER_UNEXPLAINED
+        };
+        self.statement(effect).is_some_and(holds)
     }
 
     /// The terms with each effect that does not matter gone for good, but for what every car has: the narrow prior alone lets large evidence keep
@@ -289,9 +323,13 @@ impl Inferred {
         out
     }
 
-    /// Parameters of an effect where it matters, and their standard deviations.
-    pub(crate) fn size(&self, effect: EffectId) -> (Vec<f64>, Vec<f64>) {
+    /// Parameters of an effect where it matters, and their standard deviations: those of the most probable model, if it has the effect, else of
+    /// the models that have it.
+    pub(crate) fn size(&self, effect: EffectId) -> Sized {
         let Some(t) = self.term_of(effect) else { return (Vec::new(), Vec::new()) };
+        if let Some(sized) = self.sizes.effect(&self.columns, effect) {
+            return sized;
+        }
         let wide = self.selection.mean[t].len() - 1;
         let from = self.terms[t].from;
         let mean = self.selection.mean[t][wide].iter().enumerate();
@@ -395,7 +433,8 @@ mod tests {
     #[test]
     fn a_lag_is_found_with_its_size_and_left_out_its_site_is() {
         let found = inferred(0.06, &[]);
-        assert!(found.probability(EffectId::SteeringLag) > 0.9, "{:?}", found.confirmed);
+        let lag = found.term_of(EffectId::SteeringLag).unwrap();
+        assert!(found.confirmed[lag] > 0.9 && found.chosen[lag] > 0, "{:?}", found.confirmed);
         let (size, sigma) = found.size(EffectId::SteeringLag);
         assert!((size[0] - 0.06).abs() < 0.01 && sigma[0] < 0.01, "{size:?} {sigma:?}");
         let without = inferred(0.06, &[EffectId::SteeringLag, EffectId::SteeringDelay]);

@@ -151,7 +151,7 @@ impl Joint {
             })
             .collect();
         let channels = engine.recording.channels.len();
-        let parts: Vec<Part> = windows
+        let mut parts: Vec<Part> = windows
             .windows
             .par_iter()
             .zip(starts)
@@ -186,9 +186,9 @@ impl Joint {
                 part
             })
             .collect();
-        let finite = parts
-            .iter()
-            .all(|p| p.residual.iter().all(|v| v.is_finite()) && p.jacobian.iter().all(|v| v.is_finite()));
+        // A window in which the model runs away tells nothing, and would drown all others.
+        let lost = parts.iter_mut().filter(|p| !p.is_calm()).map(Part::blank).count();
+        let finite = 2 * lost < parts.len();
         finite.then(|| Self { parts, block: windows.block.clone(), channels, columns: columns.len() })
     }
 
@@ -334,7 +334,23 @@ impl Joint {
     }
 }
 
+/// Derivative of a prediction, in units of the noise for a unit of a parameter, from which a rollout has run away: half a second of any car with
+/// any tires stays below by orders of magnitude.
+const RUN_AWAY: f64 = 1e7;
+
 impl Part {
+    fn is_calm(&self) -> bool {
+        let calm = |v: &f64| v.is_finite() && v.abs() < RUN_AWAY;
+        self.residual.iter().chain(self.jacobian.iter()).chain(self.start.iter()).all(calm)
+    }
+
+    /// The window with nothing said.
+    fn blank(&mut self) {
+        self.residual.fill(0.0);
+        self.jacobian.fill(0.0);
+        self.start.fill(0.0);
+    }
+
     /// Cost, half its gradient, and the shift of the start state, for other residuals under the present noise.
     fn looked_at(&self, residual: DVector<f64>, scale: &[f64]) -> (f64, DVector<f64>, [f64; 2]) {
         let n = residual.len() as f64;

@@ -1,12 +1,7 @@
-//! Whether the noise of a recording can be told, so that errors can be read against it.
+//! Whether errors can be read against the noise of a recording.
 
 use gripsight_model::Recording;
-use gripsight_model::noise::{ROUGH_RATIO, WHITE_RATIO, unclear};
-
-/// Whether the noise of most channels can be told, if roughly, so that errors can be read against it.
-pub(crate) fn is_known(recording: &Recording) -> bool {
-    2 * unclear(recording, ROUGH_RATIO).len() <= recording.channels.iter().filter(|c| c.scored()).count()
-}
+use gripsight_model::noise::{WHITE_RATIO, unclear};
 
 /// A sentence where the noise cannot be told from the signals.
 pub(crate) fn caveat(recording: &Recording) -> Option<String> {

@@ -9,6 +9,7 @@ use gripsight_vehicle::PacejkaParameters;
 use serde::Serialize;
 
 use crate::ExtendedModelFile;
+use crate::answer::{Change, SiteAnswer};
 
 /// What a diagnosis comes to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -69,7 +70,16 @@ pub struct RankedEffect {
     /// it makes held-out errors larger. Unknown (`null`) where that gap's interval reaches down to the noise, where the share's own is
     /// wider than twice the gap, where the effect stands in place of a retune, and beyond the three best that were not accepted.
     pub gap_closed_fraction: Estimate,
-    /// Stated chance that it is the cause.
+    /// Share of the error on held-out data, noise included, that is left without it and that it closes, in the model of the inference, whose free
+    /// terms stay; unknown (`null`) where that model does not have it.
+    pub needed_fraction: f64,
+    /// Logarithm of how much likelier held-out data are with it than without it; unknown (`null`) where the model does not have it.
+    pub held_out_log_ratio: f64,
+    /// What it explains over what of the unexplained looks like it; infinite (`null`) where nothing unexplained is needed.
+    pub over_unexplained: f64,
+    /// Half widths of its interval that its size is away from nothing.
+    pub size_over_half_width: f64,
+    /// Probability that it matters.
     pub confidence: f64,
     /// Effects that this recording cannot tell from it.
     pub confused_with: Vec<&'static str>,
@@ -184,36 +194,6 @@ pub struct TirePair {
     pub with_effect: PacejkaParameters,
 }
 
-/// How one effect compared with the model without it and with its rivals.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Comparison {
-    /// Canonical name.
-    pub name: &'static str,
-    /// Drop of the cost per residual against the model without it.
-    pub gain: f64,
-    /// How sure that drop is, in standard deviations over blocks.
-    pub z: f64,
-    /// How sure the best of the round beats it, in standard deviations over blocks; 0 for the best.
-    pub behind_z: f64,
-    /// How parallel its signature is to that of the best, tires moving along: 0 to 1.
-    pub alike: f64,
-    /// Its size over a size that matters.
-    pub relative_size: f64,
-    /// How far the tires moved with it, in units of their trust.
-    pub tire_shift: f64,
-}
-
-/// One look at the library: what each refitted effect would add to the model that the others make up.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Look {
-    /// The effect that this look is about; nothing for the last, in which none was found.
-    pub about: Option<&'static str>,
-    /// Cost per residual before.
-    pub cost: f64,
-    /// The effects refitted, best first.
-    pub compared: Vec<Comparison>,
-}
-
 /// An instant as measured and as predicted by open-loop rollouts of half a second.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prediction {
@@ -248,20 +228,13 @@ pub struct Series {
     pub horizon: Vec<[f64; 4]>,
 }
 
-/// What the model does not explain of the windows that were fitted. Pairs are with retuned tires, and with the effects found.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Unexplained {
-    /// Weighted cost per residual: 0.75 is noise.
-    pub cost: [f64; 2],
-    /// By the place in which a cause can sit (steering, sensors, lateral forces, longitudinal forces, road and wind): how much of the cost
-    /// free terms of that place would explain on windows that they were not fitted to; beside the effects found, on the 85 % of the windows
-    /// that the model follows best.
-    pub rooms: BTreeMap<&'static str, [f64; 2]>,
-    /// By effect found: how much of the weighted cost per residual it explains beside the others.
-    pub explained: BTreeMap<&'static str, f64>,
-    /// By effect found: how far its size drifts between this and the held-out data and between halves of this, as a share of it. A cause
-    /// has one size.
-    pub drift: BTreeMap<&'static str, f64>,
+/// How the inference went.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Inference {
+    /// How often everything was linearised.
+    pub rounds: usize,
+    /// How many times less the errors tell than if they were independent.
+    pub dispersion: f64,
 }
 
 /// A diagnosis.
@@ -273,6 +246,10 @@ pub struct Diagnosis {
     pub reasons: Vec<String>,
     /// Effects: those accepted, in the order of what they gain, then candidates in the order of what each would close.
     pub effects: Vec<RankedEffect>,
+    /// Site by site, how likely something is the matter there, the likeliest first: stands whatever the verdict.
+    pub sites: Vec<SiteAnswer>,
+    /// What differs from the earlier drive, the likeliest first; empty without one.
+    pub changes: Vec<Change>,
     /// Effects that these signals cannot show.
     pub invisible: Vec<Invisible>,
     /// Sizes from which effects would show.
@@ -294,12 +271,9 @@ pub struct Diagnosis {
     pub data_health: DataHealth,
     /// What to drive or record next.
     pub drive_next: Vec<String>,
-    /// How the effects compared: a look for each that is named, then the last look, in which no more was found.
-    pub looks: Vec<Look>,
-    /// Weighted cost per residual with nothing claimed, and after each effect that was taken: about 0.8 is noise.
-    pub search_costs: Vec<f64>,
-    /// What free terms would explain of the windows fitted, room by room.
-    pub unexplained: Unexplained,
+    /// How often everything was linearised, and how many times less the errors tell than if they were independent; nothing where the data cannot
+    /// tell.
+    pub inference: Option<Inference>,
     /// Points of the pictures.
     #[serde(skip)]
     pub series: Series,

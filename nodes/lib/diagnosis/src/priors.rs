@@ -1,10 +1,9 @@
 //! What is known beforehand: bounds and priors of all parameters.
 
 use gripsight_estimation::shooting::{Parameter, Prior};
-use gripsight_model::{BASE, EffectId, HOLD, TIRES, tires_to_parameters};
+use gripsight_model::{EffectId, HOLD, TIRES, tires_to_parameters};
 
 use crate::engine::Engine;
-use crate::state::State;
 use crate::trust::TireTrust;
 
 /// Bounds of (B C D, C, D, E).
@@ -16,16 +15,6 @@ const PRIOR_SIZES: f64 = 3.0;
 const RESIDUALS_PER_OBSERVATION: f64 = 30.0;
 
 impl Engine<'_> {
-    /// How far a state's tires lie from those handed over: root of the mean square in units of the trust.
-    pub(crate) fn tire_shift(&self, state: &State) -> f64 {
-        let trusted = self.parameters(&[], &[], &state.parameters[..BASE], 1.0);
-        let squares = trusted
-            .iter()
-            .filter_map(|p| p.prior.map(|prior| ((p.start - prior.mean) / prior.sigma).powi(2)));
-        let tighter = if self.trust == TireTrust::free() { 1.0 } else { RESIDUALS_PER_OBSERVATION };
-        (squares.sum::<f64>() / tighter / TIRES as f64).sqrt()
-    }
-
     /// How much of an effect this car may well have without anything being the matter; `None` of those that are no background.
     pub(crate) fn usual(&self, effect: EffectId) -> Option<f64> {
         if self.holds(effect) {

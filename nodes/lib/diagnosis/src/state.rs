@@ -3,7 +3,6 @@
 use gripsight_model::{BASE, EffectId, TIRES, tires_from_parameters};
 use std::ops::Range;
 
-use gripsight_estimation::shooting::Fit;
 use gripsight_vehicle::PacejkaParameters;
 
 /// A model with its parameters fitted.
@@ -14,16 +13,9 @@ pub(crate) struct State {
     /// All of the model: the background that is not claimed, what was handed over, then those that are claimed.
     pub(crate) effects: Vec<EffectId>,
     pub(crate) parameters: Vec<f64>,
-    /// Places of the parameters that its fit moved.
-    pub(crate) free: Vec<usize>,
     pub(crate) starts: Vec<[f64; 2]>,
     pub(crate) cost: f64,
-    pub(crate) window_costs: Vec<f64>,
-    /// Residuals that its fit counted.
-    pub(crate) residuals: f64,
     pub(crate) finite: bool,
-    /// The problem around it, where it was fitted to the end.
-    pub(crate) fit: Option<Box<Fit>>,
 }
 
 impl State {
@@ -37,17 +29,6 @@ impl State {
     /// Parameters of one of its effects.
     pub(crate) fn of(&self, effect: EffectId) -> Option<&[f64]> {
         self.parameters.get(self.rows(effect))
-    }
-
-    /// Whether a parameter is held by a bound.
-    pub(crate) fn is_held(&self, place: usize) -> bool {
-        self.fit.as_ref().is_some_and(|f| f.on_bound.contains(&place))
-    }
-
-    /// Whether a parameter of an effect is at its null, where bounds hold it too: that is a size like any other.
-    pub(crate) fn is_gone(&self, effect: EffectId, place: usize) -> bool {
-        let null = place.checked_sub(self.rows(effect).start).and_then(|i| effect.spec().parameters.get(i));
-        null.is_some_and(|p| (self.parameters[place] - p.null).abs() < 1e-9)
     }
 
     pub(crate) fn tires(&self) -> PacejkaParameters {

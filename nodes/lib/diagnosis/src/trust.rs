@@ -26,17 +26,6 @@ impl TireTrust {
         Self { stiffness: 0.02, peak: 0.02, shape: 0.05, curvature: 0.25 }
     }
 
-    /// The same, but trusted no more than `other` anywhere.
-    #[must_use]
-    pub(crate) fn at_most(self, other: Self) -> Self {
-        Self {
-            stiffness: self.stiffness.max(other.stiffness),
-            peak: self.peak.max(other.peak),
-            shape: self.shape.max(other.shape),
-            curvature: self.curvature.max(other.curvature),
-        }
-    }
-
     /// No tires given: only what makes the fit well posed.
     #[must_use]
     pub fn free() -> Self {

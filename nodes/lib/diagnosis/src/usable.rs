@@ -5,7 +5,7 @@ use gripsight_model::{ModelError, NEEDED_S, Recording};
 use gripsight_signals::DataHealth;
 use gripsight_vehicle::PacejkaParameters;
 
-use crate::outcome::{Diagnosis, GapBudget, Series, TirePair, Unexplained, Verdict, Where};
+use crate::outcome::{Diagnosis, GapBudget, Series, TirePair, Verdict, Where};
 use crate::{ExtendedModelFile, GapError, Request};
 use gripsight_model::noise::spread;
 
@@ -67,6 +67,8 @@ pub(crate) fn refused(request: &Request<'_>, error: &GapError, data_health: Data
         verdict: Verdict::NotIdentifiable,
         reasons: vec![error.to_string()],
         effects: Vec::new(),
+        sites: Vec::new(),
+        changes: Vec::new(),
         invisible: Vec::new(),
         detection_limits: Vec::new(),
         places: Where::default(),
@@ -88,9 +90,7 @@ pub(crate) fn refused(request: &Request<'_>, error: &GapError, data_health: Data
         extended_model: request.model.cloned().unwrap_or_else(|| ExtendedModelFile::of_tires(tires)),
         data_health,
         drive_next: vec![next.to_owned()],
-        looks: Vec::new(),
-        search_costs: Vec::new(),
-        unexplained: Unexplained::default(),
+        inference: None,
         series: Series::default(),
     }
 }

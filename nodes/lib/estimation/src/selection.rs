@@ -142,16 +142,15 @@ pub fn select(
             evidence = sampler.refresh()?;
         }
         for &i in &open {
-            let own: Vec<Vec<[f64; 2]>> = (0..count(&terms[i])).map(|a| sampler.moments(i, a)).collect();
-            let ratios: Vec<f64> = (0..count(&terms[i]))
-                .map(|a| sampler.ratio(&[(i, a)]) + within_bounds(&terms[i], a, &own[a]))
-                .collect();
-            let largest = ratios.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            let weights: Vec<f64> = ratios.iter().map(|r| (r - largest).exp()).collect();
-            let total: f64 = weights.iter().sum();
-            if !(total.is_finite() && total > 0.0) {
-                return None;
-            }
+            let (own, weights, total) = match sampler.weights(i) {
+                Some(found) => found,
+                None => {
+                    // The updates have lost too many digits: from scratch.
+                    evidence = sampler.refresh()?;
+                    let Some(found) = sampler.weights(i) else { continue };
+                    found
+                }
+            };
             if sweep >= RUN_IN {
                 for (a, w) in weights.iter().enumerate() {
                     let share = w / total;
@@ -195,12 +194,15 @@ pub fn select(
             visited.push(sampler.chosen.iter().map(|&a| a as u8).collect());
         }
     }
-    let n = SWEEPS as f64;
+    let shares = |of: &[(f64, Vec<[f64; 2]>)]| -> Vec<f64> {
+        let all: f64 = of.iter().map(|s| s.0).sum();
+        of.iter().map(|s| if all > 0.0 { s.0 / all } else { 1.0 / of.len() as f64 }).collect()
+    };
     let moment = |s: &(f64, Vec<[f64; 2]>), f: fn([f64; 2]) -> f64| -> Vec<f64> {
         s.1.iter().map(|sum| if s.0 > 0.0 { f(sum.map(|v| v / s.0)) } else { f64::NAN }).collect()
     };
     Some(Selection {
-        probability: sums.iter().map(|t| t.iter().map(|s| s.0 / n).collect()).collect(),
+        probability: sums.iter().map(|t| shares(t)).collect(),
         mean: sums.iter().map(|t| t.iter().map(|s| moment(s, |m| m[0])).collect()).collect(),
         sigma: sums
             .iter()
@@ -287,6 +289,21 @@ fn share_within(mean: f64, sigma: f64, [low, high]: [f64; 2]) -> f64 {
 impl Sampler<'_> {
     fn log_weight(&self) -> f64 {
         self.terms.iter().zip(&self.chosen).map(|(t, &a)| t.log_weights[a]).sum()
+    }
+
+    /// Moments of a term's columns under each of its alternatives, the alternatives' weights, and their sum; `None` where rounding has made them no
+    /// weights.
+    #[expect(clippy::type_complexity, reason = "used in one place, and taken apart at once")]
+    fn weights(&self, i: usize) -> Option<(Vec<Vec<[f64; 2]>>, Vec<f64>, f64)> {
+        let term = &self.terms[i];
+        let alternatives = 0..term.log_weights.len();
+        let own: Vec<Vec<[f64; 2]>> = alternatives.clone().map(|a| self.moments(i, a)).collect();
+        let ratio = |a: usize| self.ratio(&[(i, a)]) + within_bounds(term, a, &own[a]);
+        let ratios: Vec<f64> = alternatives.map(ratio).collect();
+        let largest = ratios.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let weights: Vec<f64> = ratios.iter().map(|r| (r - largest).exp()).collect();
+        let total: f64 = weights.iter().sum();
+        (total.is_finite() && total > 0.0).then_some((own, weights, total))
     }
 
     /// Covariance and mean from scratch; the logarithm of evidence times prior weight.

@@ -6,8 +6,8 @@
 use std::collections::BTreeMap;
 
 use gripsight_diagnosis::{
-    Diagnosis, EffectParameter, ExtendedModelFile, GapBudget, GapStep, Invisible, Place, Prediction,
-    RankedEffect, Series, TirePair, Unexplained, Verdict, Where,
+    Change, Diagnosis, EffectParameter, ExtendedModelFile, GapBudget, GapStep, Invisible, MechanismAnswer,
+    Place, Prediction, RankedEffect, Series, SiteAnswer, TirePair, Verdict, Where,
 };
 use gripsight_estimation::Estimate;
 use gripsight_model::{Identity, Need};
@@ -31,6 +31,10 @@ fn diagnosis() -> Diagnosis {
                     EffectParameter { value, low: 0.9 * value, high: 1.1 * value, unit, before: None },
                 )]),
                 gap_closed_fraction: estimate(0.62, 0.1),
+                needed_fraction: 0.5,
+                held_out_log_ratio: 40.0,
+                over_unexplained: f64::INFINITY,
+                size_over_half_width: 8.0,
                 confidence: if accepted { 0.93 } else { 0.0 },
                 confused_with: if accepted { vec!["steering_lag"] } else { Vec::new() },
             }
@@ -56,6 +60,26 @@ fn diagnosis() -> Diagnosis {
             effect("steering_delay", true, "delay_s", 0.047, "s"),
             effect("tire_relaxation", false, "sigma_m", 0.08, "m"),
         ],
+        sites: vec![SiteAnswer {
+            name: "steering",
+            probability: 0.99,
+            closed_fraction: estimate(0.52, 0.1),
+            mechanisms: vec![MechanismAnswer { name: "steering_delay", probability: 0.8 }],
+            other_probability: 0.6,
+            unexplained_fraction: 0.1,
+        }],
+        changes: vec![Change {
+            site: "steering",
+            name: "other",
+            difference: EffectParameter {
+                value: f64::NAN,
+                low: f64::NAN,
+                high: f64::NAN,
+                unit: "1",
+                before: None,
+            },
+            probability: 0.97,
+        }],
         invisible: vec![Invisible {
             need: Need::LongitudinalCommand,
             name: "aero_drag",
@@ -109,9 +133,7 @@ fn diagnosis() -> Diagnosis {
             recorded: vec!["x_m"],
         },
         drive_next: vec!["to tell steering_delay from steering_lag: steering to 3 Hz".into()],
-        looks: Vec::new(),
-        search_costs: Vec::new(),
-        unexplained: Unexplained::default(),
+        inference: None,
         series: Series {
             tire_curves: [curve(0.5).collect(), curve(0.45).collect()],
             slip_driven_rad: [0.16, 0.12],
@@ -239,6 +261,23 @@ fn a_comparison_speaks_of_what_has_changed() {
         let html = page_since(&d, Some("monday.mcap"));
         assert!(html.contains(words) && html.contains("Two drives compared"), "{words}");
     }
+}
+
+#[test]
+fn each_site_is_told_with_its_mechanisms_their_sizes_and_what_remains() {
+    let text = gap_text(&diagnosis(), None, &[]);
+    let line = text.lines().find(|l| l.starts_with("sites")).unwrap();
+    assert!(line.contains("the steering chain 99 %: steering delay (delay 0.0470 ["), "{line}");
+    assert!(line.contains("80 % or something that the library lacks 60 %; closes 52 %"), "{line}");
+    assert!(line.contains("10 % of that by no effect"), "{line}");
+    assert!(
+        text.contains(
+            "changes    something with the steering chain that the library lacks has changed: 97 %"
+        )
+    );
+    let quiet = Diagnosis { sites: Vec::new(), changes: Vec::new(), ..diagnosis() };
+    assert!(gap_text(&quiet, None, &[]).contains("nothing is the matter"));
+    assert!(page(&diagnosis()).contains("Where something is the matter"));
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! The page of a diagnosis: where model and real car disagree, why, and by how much.
 
 mod budget;
-mod graded;
 mod pictures;
+mod sites;
 mod tables;
 mod terminal;
 mod verdict;
@@ -12,7 +12,6 @@ use gripsight_diagnosis::{Diagnosis, Verdict};
 use gripsight_signals::TopicHealth;
 use maud::{Markup, html};
 
-pub use graded::graded_text;
 pub use terminal::gap_text;
 
 use crate::page::{facts_table, figure, list, page, section};
@@ -44,6 +43,7 @@ pub fn gap_page(input: &GapInput<'_>) -> Result<String, ReportError> {
         @if d.verdict == Verdict::NotIdentifiable {
             (section("Drive or record next", true, &next(d)))
         } @else {
+            @if input.earlier.is_some() { (section("What has changed", true, &sites::changes(d))) }
             (explained(d)?)
         }
     };
@@ -58,6 +58,7 @@ fn explained(d: &Diagnosis) -> Result<Markup, ReportError> {
     let (heat, scale) = pictures::heat(d);
     Ok(html! {
         (section("How large the gap is", true, &budget::budget(d)))
+        (section("Where something is the matter", true, &sites::table(d)))
         (section("Effects, ranked", true, &tables::effects(d)))
         (section("Front tires", false, &figure(&front, "")?))
         (section("Rear tires", false, &figure(&rear, "")?))

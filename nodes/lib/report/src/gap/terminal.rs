@@ -5,6 +5,7 @@ use std::fmt::Write;
 use gripsight_diagnosis::{Diagnosis, Place, Verdict};
 use gripsight_estimation::Estimate;
 
+use super::sites;
 use super::verdict::sentence;
 use super::words::{closes, figure, listed, sizes, unit, words};
 use crate::text::{fixed, interval, percent};
@@ -41,6 +42,7 @@ pub fn gap_text(d: &Diagnosis, earlier: Option<&str>, data_notes: &[String]) -> 
         let _ = writeln!(out, "identity   {}: {}", identity.name, identity.finding);
     }
     budget(&mut out, d);
+    sites::lines(&mut out, d);
     effects(&mut out, d);
     places(&mut out, d);
     // What `next` says how to see needs no line of its own.
