@@ -21,13 +21,14 @@ pub struct SiteAnswer {
     pub name: &'static str,
     /// Probability that something is the matter there.
     pub probability: f64,
-    /// What the site closes of what all effects and flexible terms together do, on the windows that were fitted.
+    /// What the site closes: the share of its effects that the verdict names, on held-out data; where it names none, of what all effects and
+    /// flexible terms together close on the windows that were fitted.
     pub closed_fraction: Estimate,
     /// Which of the library's effects, the likeliest first.
     pub mechanisms: Vec<MechanismAnswer>,
     /// Probability that something is the matter there that no effect of the library does.
     pub other_probability: f64,
-    /// Share of [`Self::closed_fraction`] that no effect of the library closes.
+    /// Share of what is closed on the windows fitted that no effect of the library closes.
     pub unexplained_fraction: f64,
 }
 

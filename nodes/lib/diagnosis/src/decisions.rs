@@ -37,8 +37,8 @@ pub(crate) fn usual_flexible(site: Site, term: usize) -> f64 {
 /// Share of the error on data held out, noise included, that is left without free terms and that they must close to be needed.
 pub(crate) const LEAST_CLOSED: f64 = 0.025;
 
-/// Probability at most that is stated of free terms that held-out data do not need.
-pub(crate) const NEEDLESS: f64 = 0.1;
+/// Probability at most that is stated of effects and free terms that held-out data do not need.
+pub(crate) const NEEDLESS: f64 = 0.05;
 
 /// Probability from which free terms are needed, and a change between two drives is stated: more likely than not.
 pub(crate) const LIKELY: f64 = 0.5;

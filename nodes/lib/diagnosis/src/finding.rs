@@ -106,7 +106,9 @@ fn confused(inferred: &Inferred, library: &[EffectId], effect: EffectId) -> Vec<
             .term_of(*e)
             .is_some_and(|t| share(&without, t) >= IN_ITS_PLACE && share(&with, t) < 0.5 * share(&without, t))
     };
-    out.extend(inferred.columns.effects.iter().copied().filter(|e| *e != effect && instead(e)));
+    let near = |e: &EffectId| e.spec().sites.iter().any(|s| effect.spec().sites.contains(s));
+    let others = inferred.columns.effects.iter().copied().filter(|e| *e != effect && near(e) && instead(e));
+    out.extend(others);
     out
 }
 
@@ -116,7 +118,7 @@ pub(crate) fn untried(effect: EffectId, library: &[EffectId]) -> impl Iterator<I
 }
 
 /// The graded answer: how likely each site is at fault, what it closes, and which mechanisms there.
-pub(crate) fn sites(inferred: &Inferred) -> Vec<SiteAnswer> {
+pub(crate) fn sites(inferred: &Inferred, effects: &[RankedEffect]) -> Vec<SiteAnswer> {
     let shares = Shares::of(inferred);
     let mut out: Vec<SiteAnswer> = Site::ALL
         .into_iter()
@@ -130,11 +132,9 @@ pub(crate) fn sites(inferred: &Inferred) -> Vec<SiteAnswer> {
                 .collect();
             let terms: Vec<usize> = here.iter().filter_map(|e| inferred.term_of(*e)).collect();
             let other = inferred.terms_of_site(site);
-            let counted = inferred
-                .selection
-                .probability_that(|c| terms.iter().copied().chain(other.clone()).any(|t| c[t] > 0));
-            let likeliest = here.iter().map(|e| inferred.probability(*e)).fold(0.0, f64::max);
-            let probability = counted.max(likeliest);
+            // Nothing is the matter if nothing of all this is.
+            let nothing = here.iter().map(|e| 1.0 - inferred.probability_here(*e)).product::<f64>();
+            let probability = 1.0 - nothing * (1.0 - inferred.other(site));
             let mut mechanisms: Vec<MechanismAnswer> = here
                 .iter()
                 .map(|e| MechanismAnswer { name: e.name(), probability: inferred.probability(*e) })
@@ -146,7 +146,20 @@ pub(crate) fn sites(inferred: &Inferred) -> Vec<SiteAnswer> {
             } else {
                 [Estimate::UNKNOWN; 2]
             };
-            let unexplained = (1.0 - by_mechanisms.value / closed.value).clamp(0.0, 1.0);
+            let unexplained = if inferred.other(site) >= decisions::LIKELY {
+                (1.0 - by_mechanisms.value / closed.value).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+            let named = here.iter().filter_map(|e| effects.iter().find(|r| r.name == e.name() && r.accepted));
+            let shares: Vec<Estimate> =
+                named.map(|e| e.gap_closed_fraction).filter(|c| c.value.is_finite()).collect();
+            let sum = |of: fn(&Estimate) -> f64| shares.iter().map(of).sum();
+            let closed = if shares.is_empty() {
+                closed
+            } else {
+                Estimate { value: sum(|c| c.value), low: sum(|c| c.low), high: sum(|c| c.high) }
+            };
             SiteAnswer {
                 name: site.name(),
                 probability,
@@ -189,7 +202,7 @@ impl Shares {
     fn closed(&self, inferred: &Inferred, mechanisms: &[usize], other: Range<usize>) -> [Estimate; 2] {
         let with = |terms: &mut dyn Iterator<Item = usize>| {
             let mut chosen = vec![0; inferred.terms.len()];
-            terms.for_each(|t| chosen[t] = inferred.selection.best[t]);
+            terms.for_each(|t| chosen[t] = usize::from(inferred.chosen[t] > 0));
             let found = configuration(&inferred.weighed.total, inferred.dispersion, &self.terms, &chosen);
             let drops = found.map(|c| drops(inferred, &self.null, &c.step));
             drops.map_or(Estimate::UNKNOWN, |drops| {

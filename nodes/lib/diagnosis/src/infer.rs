@@ -296,6 +296,12 @@ impl Inferred {
         }
     }
 
+    /// Probability that an effect, or what does nearly the same at its site and is not among the candidates, matters.
+    pub(crate) fn probability_here(&self, effect: EffectId) -> f64 {
+        let own = self.probability(effect);
+        self.statement(effect).map_or(own, |s| (own * (1.0 + s.untried as f64)).min(1.0))
+    }
+
     /// What is stated of an effect, if it is in the model.
     pub(crate) fn statement(&self, effect: EffectId) -> Option<&Statement> {
         let term = self.term_of(effect).filter(|_| self.is_open(effect))?;
