@@ -9,7 +9,8 @@
 //! 3. One inference (`infer`): tires, every effect of the library ([`EffectId`](gripsight_model::EffectId)) and flexible terms of each site are
 //!    hypotheses in one comparison, under one noise model. It gives the probability that each matters; the most probable model is fitted by
 //!    rollouts, everything is linearised anew around it, and what rollouts find needless goes.
-//! 4. An effect is stated (`stated`) if it is likelier than not, if data that nothing was fitted to need it, and if it is not small beside what
+//! 4. Held-out data multiply the odds (`stated`): free terms that they do not need go, effects that they make likely come in, effects that they make
+//!    unlikely go. What is left is named from a chance of being a cause on, which a fit on open development cases gives, unless it is small beside what
 //!    looks like it and no effect of the library does. Whatever the verdict, [`Diagnosis::sites`] says how likely something is the matter where.
 //! 5. Open-loop rollouts of 1 s on held-out blocks (or another bag): nominal, retuned, with the effects, with flexible terms on top (the
 //!    ceiling), with the residual network of `gripsight_s4` in place of effects, against the noise.
