@@ -243,8 +243,10 @@ impl Joint {
                     at += residual.len();
                     cost += loss;
                 }
-                let information = tall.tr_mul(&tall);
-                (Quadratic { information, gradient: -tall.tr_mul(&side) }, cost, rows as f64)
+                // A product of matrices is blocked, one with a transpose is not.
+                let across = tall.transpose();
+                let gradient = -(&across * &side);
+                (Quadratic { information: across * tall, gradient }, cost, rows as f64)
             })
             .collect();
         let n = self.columns;
