@@ -12,7 +12,7 @@ use gripsight_diagnosis::{Diagnosis, Earlier, ExtendedModelFile, Request, Verdic
 use gripsight_identification::export::{read_tires, stamp_text};
 use gripsight_identification::vehicle_hash;
 use gripsight_model::EffectId;
-use gripsight_report::{GapInput, Header, TopicUse, gap_page, gap_text, topic_uses};
+use gripsight_report::{Before, GapInput, Header, TopicUse, gap_page, gap_text, topic_uses};
 use gripsight_signals::{Check, StateSequence, WindowConfig};
 use gripsight_vehicle::VehicleParameters;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -27,7 +27,8 @@ use crate::{Outcome, outputs};
 /// Explain where the model and the real car disagree.
 ///
 /// With one BAG the model is the single-track model on the tires of --pacejka, or on tires identified from the bag's training
-/// blocks. With two, BAG is compared with BAG2: what has changed from the first drive to the second.
+/// blocks. With two, BAG is compared with BAG2: what has changed from the first drive to the second. With --simulator or --simulator-bag
+/// the model is your own simulator.
 ///
 /// DIR receives gap.json, report.html, timing.json and extended_model.yaml (the named effects with their parameters).
 /// Exit code 3: the data cannot tell.
@@ -57,6 +58,10 @@ pub(crate) struct DiagnoseArgs {
     /// (DIR/simulator.patch). Effects may be left out by `--without`; its own parameters by `fixed` in the file.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["bag2", "later", "pacejka", "extended_model", "heldout", "only", "predictions"])]
     pub(crate) simulator: Option<PathBuf>,
+    /// A drive of your simulator, where it is closed: another track or driver will do. What differs from the simulator to the car (BAG); what
+    /// the simulator itself has that the model lacks is no difference.
+    #[arg(long, value_name = "SIM", conflicts_with_all = ["bag2", "later", "pacejka", "extended_model", "simulator"])]
+    simulator_bag: Option<PathBuf>,
     /// Leave an effect out of the library. May be repeated.
     #[arg(long, value_name = "EFFECT", value_parser = effects(), hide_possible_values = true)]
     pub(crate) without: Vec<String>,
@@ -118,16 +123,18 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         return crate::simulator::run(args, file);
     }
     let start = Instant::now();
-    let bag2 = args.later.as_ref().or(args.bag2.as_ref());
+    // The drive that is explained is the later one or the car's, from the model of the earlier one or the simulator's.
+    let (subject, other) = match (args.later.as_ref().or(args.bag2.as_ref()), &args.simulator_bag) {
+        (Some(later), _) => (later, Some(&args.bag)),
+        (None, simulator) => (&args.bag, simulator.as_ref()),
+    };
     let bags: Vec<&Path> =
-        [Some(&args.bag), bag2, args.heldout.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
+        [Some(subject), other, args.heldout.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
     outputs::check(&args.out, &FILES, args.predictions.as_deref(), &bags)?;
     let topics = args.topics.as_deref().map(TopicMap::read).transpose()?.unwrap_or_default();
     let vehicle = vehicle(args.vehicle.as_deref())?;
     let tires = args.pacejka.as_deref().map(tires).transpose()?;
     let model = args.extended_model.as_deref().map(extended_model).transpose()?;
-    // The drive that is explained is the later one, from the model of the earlier one.
-    let subject = bag2.unwrap_or(&args.bag);
     let usable = |path: &Path| -> anyhow::Result<_> {
         let (sequence, report) = read(path, &topics)?;
         let (sequence, recorded) = for_diagnosis(&sequence, &vehicle)
@@ -135,7 +142,7 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         Ok((sequence, report, recorded))
     };
     let (sequence, report, recorded) = usable(subject)?;
-    let first = bag2.map(|_| usable(&args.bag)).transpose()?;
+    let first = other.map(|path| usable(path)).transpose()?;
     let held_out = args.heldout.as_deref().map(usable).transpose()?;
     let reading_s = start.elapsed().as_secs_f64();
     let spinner =
@@ -153,7 +160,9 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         ..Request::new(sequence, &vehicle)
     };
     let earlier = first.as_ref().map(|first| Earlier::diagnosed(&alone(&first.0), &mut progress));
-    let earlier = earlier.transpose().with_context(|| format!("cannot diagnose {}", args.bag.display()))?;
+    let earlier = earlier
+        .transpose()
+        .with_context(|| format!("cannot diagnose {}", other.unwrap_or(subject).display()))?;
     let request =
         Request { held_out: held_out.as_ref().map(|h| &h.0), earlier: earlier.as_ref(), ..alone(&sequence) };
     let result = diagnose(&request, &mut progress)
@@ -161,9 +170,13 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     spinner.finish_and_clear();
     let diagnosing_s = start.elapsed().as_secs_f64() - reading_s;
     let header = header(subject, &vehicle, &sequence);
-    let compared_with = bag2.map(|_| file_name(&args.bag));
+    let compared_with = other.map(|path| file_name(path));
+    let before = compared_with.as_deref().map(|name| match args.simulator_bag {
+        Some(_) => Before::Simulator(name),
+        None => Before::Drive(name),
+    });
     let mut notes = [read_notes(&report), signal_notes(&recorded)].concat();
-    for (path, beside) in [(Some(&args.bag), &first), (args.heldout.as_ref(), &held_out)] {
+    for (path, beside) in [(other, &first), (args.heldout.as_ref(), &held_out)] {
         if let (Some(path), Some((_, report, recorded))) = (path, beside) {
             let all = [read_notes(report), signal_notes(recorded)].concat();
             notes.extend(all.iter().map(|note| format!("{}: {note}", file_name(path))));
@@ -172,7 +185,7 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     let page = gap_page(&GapInput {
         diagnosis: &result,
         header: &header,
-        earlier: compared_with.as_deref(),
+        before,
         topics: &report.topics,
         data_notes: &notes,
     })?;
@@ -201,7 +214,7 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     if let Some(before) = &compared_with {
         println!("compared   {} with {before}", file_name(subject));
     }
-    print!("{}", gap_text(&result, compared_with.as_deref(), &notes));
+    print!("{}", gap_text(&result, before, &notes));
     let names: Vec<&str> = files.iter().map(|f| f.0).collect();
     println!("files      {} ({})", args.out.display(), names.join(", "));
     if let Some(path) = &args.predictions {

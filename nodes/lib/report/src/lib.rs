@@ -22,7 +22,7 @@ mod withheld;
 
 pub use chart::{Axis, Chart, Layer};
 pub use error::ReportError;
-pub use gap::{GapInput, gap_page, gap_text};
+pub use gap::{Before, GapInput, gap_page, gap_text};
 pub use identification::{IdentificationInput, identification_page};
 pub use page::Header;
 pub use role::Role;

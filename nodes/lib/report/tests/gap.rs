@@ -11,7 +11,7 @@ use gripsight_diagnosis::{
 };
 use gripsight_estimation::Estimate;
 use gripsight_model::{Identity, Need};
-use gripsight_report::{GapInput, Header, gap_page, gap_text, topic_notes};
+use gripsight_report::{Before, GapInput, Header, gap_page, gap_text, topic_notes};
 use gripsight_signals::{DataHealth, Pace, Spikes, TopicHealth};
 use gripsight_vehicle::PacejkaParameters;
 
@@ -199,7 +199,7 @@ fn page(diagnosis: &Diagnosis) -> String {
     page_since(diagnosis, None)
 }
 
-fn page_since(diagnosis: &Diagnosis, earlier: Option<&str>) -> String {
+fn page_since(diagnosis: &Diagnosis, before: Option<Before<'_>>) -> String {
     let header = Header {
         car: "car".into(),
         bag: "laps.mcap".into(),
@@ -209,7 +209,7 @@ fn page_since(diagnosis: &Diagnosis, earlier: Option<&str>) -> String {
         seed: None,
         command: "gripsight diagnose laps.mcap --out DIR".into(),
     };
-    gap_page(&GapInput { diagnosis, header: &header, earlier, topics: &topics(), data_notes: &[] }).unwrap()
+    gap_page(&GapInput { diagnosis, header: &header, before, topics: &topics(), data_notes: &[] }).unwrap()
 }
 
 #[test]
@@ -258,7 +258,7 @@ fn a_comparison_speaks_of_what_has_changed() {
         (Verdict::NoneOfThese, "Something has changed since monday.mcap"),
     ] {
         d.verdict = verdict;
-        let html = page_since(&d, Some("monday.mcap"));
+        let html = page_since(&d, Some(Before::Drive("monday.mcap")));
         assert!(html.contains(words) && html.contains("Two drives compared"), "{words}");
     }
 }
@@ -278,6 +278,21 @@ fn each_site_is_told_with_its_mechanisms_their_sizes_and_what_remains() {
     let quiet = Diagnosis { sites: Vec::new(), changes: Vec::new(), ..diagnosis() };
     assert!(gap_text(&quiet, None, &[]).contains("nothing is the matter"));
     assert!(page(&diagnosis()).contains("Where something is the matter"));
+}
+
+#[test]
+fn a_simulator_s_drive_is_the_other_end_of_a_change_that_leads_to_the_car() {
+    let mut d = diagnosis();
+    for (verdict, words) in [
+        (Verdict::Effects, "What differs from the simulator (sim.mcap) to the car is steering delay"),
+        (Verdict::TireRetuneOnly, "The tires differ from the simulator (sim.mcap) to the car"),
+        (Verdict::NoGap, "Nothing differs from the simulator (sim.mcap) to the car but for noise"),
+        (Verdict::NoneOfThese, "Something differs from the simulator (sim.mcap) to the car that no effect"),
+    ] {
+        d.verdict = verdict;
+        let html = page_since(&d, Some(Before::Simulator("sim.mcap")));
+        assert!(html.contains(words) && html.contains("From simulator to car"), "{words}");
+    }
 }
 
 #[test]
@@ -330,7 +345,7 @@ fn what_closes_only_a_part_is_said_so() {
     assert!(headline(&d).contains(words), "{}", headline(&d));
     assert!(headline(&d).contains("caution"));
     assert!(gap_text(&d, None, &[]).contains("54 times the noise remains, and none"));
-    let since = gap_text(&d, Some("monday.mcap"), &[]);
+    let since = gap_text(&d, Some(Before::Drive("monday.mcap")), &[]);
     assert!(since.contains("Changed since monday.mcap: steering delay (delay 0.0470 s), a part"), "{since}");
 
     d.verdict = Verdict::TireRetuneOnly;

@@ -13,6 +13,7 @@ use gripsight_signals::TopicHealth;
 use maud::{Markup, html};
 
 pub use terminal::gap_text;
+pub use verdict::Before;
 
 use crate::page::{facts_table, figure, list, page, section};
 use crate::{Header, ReportError};
@@ -24,8 +25,8 @@ pub struct GapInput<'a> {
     pub diagnosis: &'a Diagnosis,
     /// The head of the page.
     pub header: &'a Header,
-    /// The earlier drive's name where two drives are compared: its tires are the model's.
-    pub earlier: Option<&'a str>,
+    /// What the drive is compared with, where two are.
+    pub before: Option<Before<'a>>,
     /// The topics that the data come from; empty where they come as sequences.
     pub topics: &'a [TopicHealth],
     /// What reading the data met, a sentence each.
@@ -43,12 +44,16 @@ pub fn gap_page(input: &GapInput<'_>) -> Result<String, ReportError> {
         @if d.verdict == Verdict::NotIdentifiable {
             (section("Drive or record next", true, &next(d)))
         } @else {
-            @if input.earlier.is_some() { (section("What has changed", true, &sites::changes(d))) }
+            @if input.before.is_some() { (section("What has changed", true, &sites::changes(d))) }
             (explained(d)?)
         }
     };
-    let title = if input.earlier.is_some() { "Two drives compared" } else { "Sim-to-real gap" };
-    Ok(page(title, verdict::tone(d), &verdict::sentence(d, input.earlier), input.header, &body))
+    let title = match input.before {
+        Some(Before::Drive(_)) => "Two drives compared",
+        Some(Before::Simulator(_)) => "From simulator to car",
+        None => "Sim-to-real gap",
+    };
+    Ok(page(title, verdict::tone(d), &verdict::sentence(d, input.before), input.header, &body))
 }
 
 /// What there is to show where the data can tell.

@@ -6,7 +6,7 @@ use gripsight_diagnosis::{Diagnosis, Place, Verdict};
 use gripsight_estimation::Estimate;
 
 use super::sites;
-use super::verdict::sentence;
+use super::verdict::{Before, sentence};
 use super::words::{closes, figure, listed, sizes, unit, words};
 use crate::text::{fixed, interval, percent};
 
@@ -15,15 +15,15 @@ const CANDIDATES: usize = 3;
 /// Circumstances listed.
 const CIRCUMSTANCES: usize = 2;
 
-/// The diagnosis in some 25 lines. `earlier` names the drive from before where two are compared; `data_notes` is what reading the data met.
+/// The diagnosis in some 25 lines. `before` is the drive that it is compared with; `data_notes` is what reading the data met.
 #[must_use]
-pub fn gap_text(d: &Diagnosis, earlier: Option<&str>, data_notes: &[String]) -> String {
+pub fn gap_text(d: &Diagnosis, before: Option<Before<'_>>, data_notes: &[String]) -> String {
     let mut out = String::new();
     let named: Vec<&str> = d.effects.iter().filter(|e| e.accepted).map(|e| e.name).collect();
     let line = if named.is_empty() { String::new() } else { format!(": {}", named.join(", ")) };
     let health = &d.data_health;
     let _ = writeln!(out, "verdict    {}{line}", d.verdict.name());
-    let _ = writeln!(out, "           {}", sentence(d, earlier));
+    let _ = writeln!(out, "           {}", sentence(d, before));
     let _ = writeln!(
         out,
         "data       {:.0} s at {:.0} Hz, jitter {:.1} ms, {} gaps, {} frozen spans",

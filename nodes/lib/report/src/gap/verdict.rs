@@ -13,9 +13,41 @@ const REMAINS: f64 = 2.0;
 /// Error with other tires over that with flexible terms up to which the tires do what can be done.
 const NEAR_CEILING: f64 = 1.5;
 
-/// What a diagnosis comes to: of a car against its model, or of a car against its own earlier drive.
-pub(super) fn sentence(d: &Diagnosis, earlier: Option<&str>) -> String {
-    let since = earlier.map(|earlier| format!(" since {earlier}")).unwrap_or_default();
+/// What a drive is compared with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Before<'a> {
+    /// An earlier drive of the car, by its name.
+    Drive(&'a str),
+    /// A drive of the team's simulator, by its name.
+    Simulator(&'a str),
+}
+
+impl Before<'_> {
+    /// What is said of something that is not as it was there; `several` things have, one has.
+    fn changed(self, several: bool) -> String {
+        match self {
+            Self::Drive(name) => format!("{} changed since {name}", if several { "have" } else { "has" }),
+            Self::Simulator(name) => {
+                format!(
+                    "{} from the simulator ({name}) to the car",
+                    if several { "differ" } else { "differs" }
+                )
+            }
+        }
+    }
+
+    /// The head of a list of it.
+    fn head(self) -> String {
+        match self {
+            Self::Drive(name) => format!("Changed since {name}"),
+            Self::Simulator(name) => format!("From the simulator ({name}) to the car"),
+        }
+    }
+}
+
+/// What a diagnosis comes to: of a car against its model, or of a car against another drive.
+pub(super) fn sentence(d: &Diagnosis, before: Option<Before<'_>>) -> String {
+    let (has, have) = (before.map(|b| b.changed(false)), before.map(|b| b.changed(true)));
     let times = format!("{} times the noise", significant(d.gap.after.value, 2));
     let remains = remains(d);
     match d.verdict {
@@ -24,39 +56,39 @@ pub(super) fn sentence(d: &Diagnosis, earlier: Option<&str>) -> String {
             let effects = enumerated(&effects);
             let closed = closed(d);
             if is_partial(d) {
-                let change = if earlier.is_some() { format!("Changed{since}: ") } else { String::new() };
+                let change = before.map(|b| format!("{}: ", b.head())).unwrap_or_default();
                 return format!(
                     "{change}{}, a part of the gap: {closed}; {times} remains, and none of the library's effects explains that.",
-                    if earlier.is_some() { effects } else { capital(&effects) }
+                    if before.is_some() { effects } else { capital(&effects) }
                 );
             }
-            let what = match earlier {
-                Some(_) => format!("What has changed{since} is"),
+            let what = match &has {
+                Some(has) => format!("What {has} is"),
                 None => "The gap is".to_owned(),
             };
             let rest = if remains { format!("; {times} remains") } else { String::new() };
             format!("{what} {effects}: {closed}{rest}.")
         }
-        Verdict::TireRetuneOnly => match (earlier, tires_suffice(d)) {
-            (Some(_), true) => format!("The tires have changed{since}; no other effect is needed."),
+        Verdict::TireRetuneOnly => match (&have, tires_suffice(d)) {
+            (Some(have), true) => format!("The tires {have}; no other effect is needed."),
             (None, true) => "Other tires close the gap; no other effect is needed.".into(),
-            (Some(_), false) => format!("The tires have changed{since}; {times} remains."),
+            (Some(have), false) => format!("The tires {have}; {times} remains."),
             (None, false) => format!("Other tires are all that helps; {times} remains."),
         },
         Verdict::NoGap => {
             let rest = if remains { format!(" ({times})") } else { String::new() };
-            match earlier {
-                Some(_) => format!(
-                    "Nothing has changed{since} but for noise and the model's usual imperfection{rest}."
-                ),
+            match &has {
+                Some(has) => {
+                    format!("Nothing {has} but for noise and the model's usual imperfection{rest}.")
+                }
                 None => format!(
                     "No gap: model and car agree within the noise and the model's usual imperfection{rest}."
                 ),
             }
         }
-        Verdict::NoneOfThese => match earlier {
-            Some(_) => format!(
-                "Something has changed{since} that no effect of the library explains: with other tires {times} remains."
+        Verdict::NoneOfThese => match &has {
+            Some(has) => format!(
+                "Something {has} that no effect of the library explains: with other tires {times} remains."
             ),
             None => format!(
                 "There is a gap that no effect of the library explains: with other tires {times} remains."
