@@ -101,7 +101,7 @@ def nodes(context):
     ]
     if value["camera"] == "true":
         settings = [str(project_folder() / "params" / "camera_prior.yaml")]
-        started.append(node("camera_prior", remaps("odom", "image", "image/compressed"), defaults=settings))
+        started.append(node("camera_prior", [*remaps("odom", "image", "image/compressed"), ("pacejka", "identifier/pacejka")], defaults=settings))
     elif value["prior_mu"]:
         started.append(node("camera_prior", input="none", configured_mu=float(value["prior_mu"])))
     if value["gap"] == "true":

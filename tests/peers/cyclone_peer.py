@@ -40,6 +40,7 @@ SERVICES = {
     "SetParametersAtomically": ("Parameter[] parameters", "SetParametersResult result"),
     "ListParameters": ("string[] prefixes\nuint64 depth", "ListParametersResult result"),
     "DescribeParameters": ("string[] names", "ParameterDescriptor[] descriptors"),
+    "Trigger": ("uint8 structure_needs_at_least_one_member", "bool success\nstring message"),
 }
 _types = {}
 
@@ -152,11 +153,11 @@ def publish(participant, args):
 
 
 def call(participant, args):
-    name = args.type.split("/srv/")[1]
+    package, name = args.type.split("/srv/")
     request_text, reply_text = SERVICES[name]
     head = "uint64 guid\nint64 seq\n"  # rmw_cyclonedds_cpp puts these in front of every request and reply
-    request_type = struct("rcl_interfaces", f"{name}_Request", "srv", head + request_text)
-    reply_type = struct("rcl_interfaces", f"{name}_Response", "srv", head + reply_text)
+    request_type = struct(package, f"{name}_Request", "srv", head + request_text)
+    reply_type = struct(package, f"{name}_Response", "srv", head + reply_text)
     writer = DataWriter(participant, Topic(participant, f"rq{args.topic}Request", request_type), qos("reliable"))
     if not wait_until(writer.get_matched_subscriptions, args.timeout):
         return False

@@ -32,6 +32,10 @@ pub struct FrictionPrior {
     pub distance_m: f64,
     /// Pictures in that average.
     pub pictures: u32,
+    /// There is a calibration, and the newest picture shows a floor that it has not seen.
+    pub new_floor: bool,
+    /// Hash of what the track has taught; empty without it.
+    pub calibration: String,
 }
 
 impl FrictionPrior {

@@ -29,6 +29,9 @@ pub(crate) struct Facts<'a> {
     pub(crate) odometry: bool,
     /// Longest time that reading a picture took since the last look, ms.
     pub(crate) longest_ms: f64,
+    /// Lessons that the tires have given since the start, and the hash of what the track has taught.
+    pub(crate) lessons: u64,
+    pub(crate) calibration: &'a str,
 }
 
 /// ERROR: no network, or no pictures. WARN: the last picture is not usable, or there is no odometry.
@@ -45,6 +48,8 @@ pub(crate) fn status(facts: &Facts<'_>) -> Status {
         (level, format!("the last picture is not usable: {}", detail.unwrap_or(reason.as_str())))
     } else if !facts.odometry {
         (Level::Warn, "no odometry: pictures are averaged by number, not by distance, and a frozen camera goes unnoticed".into())
+    } else if facts.last.is_some_and(Estimate::new_floor) {
+        (Level::Ok, "reading a floor that the track has not taught yet".to_owned())
     } else {
         (Level::Ok, "reading the road".to_owned())
     };
@@ -53,6 +58,8 @@ pub(crate) fn status(facts: &Facts<'_>) -> Status {
         .value("pictures read", read)
         .value("pictures refused", refused)
         .value("pictures dropped for newer ones", dropped)
+        .value("lessons from the tires", facts.lessons)
+        .value("calibration", facts.calibration)
         .value("longest time for a picture [ms]", format!("{:.1}", facts.longest_ms));
     match facts.last {
         Some(e) => status
@@ -66,6 +73,7 @@ pub(crate) fn status(facts: &Facts<'_>) -> Status {
 
 #[cfg(test)]
 mod tests {
+    use gripsight_friction::Known;
     use gripsight_runtime::manual_covers;
 
     use super::*;
@@ -83,6 +91,9 @@ mod tests {
             energy: -2.0,
             unfamiliarity: Some(0.7),
             quality: None,
+            appearance: None,
+            network_mu: None,
+            known: None,
             distance_m: 3.0,
             pictures: 4,
         }
@@ -92,8 +103,11 @@ mod tests {
     fn the_manual_lists_every_state() {
         let (good, dark, failed) =
             (estimate(None), estimate(Some(Reason::Dark)), estimate(Some(Reason::NetworkFailed)));
+        let unlike = Known { mu: 0.5, sigma: 0.1, distance: 1.2 };
+        let new = Estimate { known: Some(unlike), ..estimate(None) };
         let states = [
             facts(&good),
+            facts(&new),
             facts(&dark),
             facts(&failed),
             Facts { newly_read: 0, ..facts(&good) },
@@ -113,6 +127,8 @@ mod tests {
             last: Some(last),
             odometry: true,
             longest_ms: 2.0,
+            lessons: 0,
+            calibration: "",
         }
     }
 

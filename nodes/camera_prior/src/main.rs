@@ -1,6 +1,7 @@
 //! Node: road pictures to a friction prior. See the README beside this folder.
 
 mod diagnostics;
+mod lesson;
 mod node;
 mod settings;
 

@@ -4,19 +4,22 @@ use std::time::{Duration, Instant};
 
 use gripsight_bag::{decode, encode};
 use gripsight_friction::{
-    Estimate, Frame, FrameData, FrictionEstimator, Motion, Odometer, RawPicture, Reason, RgbPicture, Source,
+    Calibration, Estimate, Frame, FrameData, FrictionEstimator, Learner, Motion, Odometer, RawPicture,
+    Reason, RgbPicture, Source,
 };
-use gripsight_msgs::FrictionPrior;
 use gripsight_msgs::standard::builtin_interfaces::Time;
 use gripsight_msgs::standard::nav_msgs::Odometry;
 use gripsight_msgs::standard::sensor_msgs::{CompressedImage, Image};
 use gripsight_msgs::standard::std_msgs::Header;
-use gripsight_runtime::{Clock, Diagnostics, Node, Publisher, Qos, Subscription};
+use gripsight_msgs::{FrictionPrior, PacejkaParams};
+use gripsight_runtime::{Clock, Diagnostics, Node, Publisher, Qos, Subscription, Trigger};
 
+use tokio::task::JoinHandle;
 use tokio::time::MissedTickBehavior;
 
 use crate::diagnostics::{Counts, Facts, status};
-use crate::settings;
+use crate::lesson::lesson;
+use crate::settings::{self, Learning};
 
 /// Age from which a picture is late: several times what transport takes.
 const LATE_NS: i64 = 100_000_000;
@@ -33,7 +36,9 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
     let wanted = configuration.input;
     let network = configuration.network.ok().flatten();
     let configured = network.is_none();
-    let estimator = FrictionEstimator::new(configuration.settings, configuration.basis, network);
+    let mut estimator = FrictionEstimator::new(configuration.settings, configuration.basis, network);
+    let learner = Learner::new(configuration.calibration.as_ref());
+    estimator.calibrate(configuration.calibration);
     let pictures = node.sensor_qos(2).with_depth(2);
     let wants = |kind: &str| wanted == "both" || wanted == kind;
     let raw = wants("raw").then(|| node.subscription::<Image>("image", pictures)).transpose()?;
@@ -41,6 +46,9 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
         .then(|| node.subscription::<CompressedImage>("image/compressed", pictures))
         .transpose()?;
     let odometry = node.subscription::<Odometry>("odom", node.sensor_qos(50))?;
+    let learns = configuration.learning.wanted && !configured;
+    let tires = learns.then(|| node.subscription::<PacejkaParams>("pacejka", Qos::latched())).transpose()?;
+    let forget = node.trigger("~/forget", "forgotten what the track has taught")?;
     let pictures_from =
         raw.iter().map(Subscription::arrivals).chain(compressed.iter().map(Subscription::arrivals));
     node.needs(pictures_from.collect::<Vec<_>>());
@@ -50,6 +58,11 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
         no_network,
         configured,
         odometer: Odometer::default(),
+        lateral_mps2: 0.0,
+        learner,
+        learning: configuration.learning,
+        lessons: 0,
+        taught: None,
         counts: Counts::default(),
         seen: Counts::default(),
         last: None,
@@ -60,15 +73,21 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
         friction: node.publisher("~/friction", Qos::latched())?,
         region: region.then(|| node.publisher("~/region/compressed", Qos::reliable(1))).transpose()?,
     };
-    Ok(work(state, raw, compressed, odometry))
+    Ok(work(state, Inputs { raw, compressed, odometry, tires, forget }))
 }
 
-async fn work(
-    mut state: State,
-    mut raw: Option<Subscription<Image>>,
-    mut compressed: Option<Subscription<CompressedImage>>,
-    mut odometry: Subscription<Odometry>,
-) -> anyhow::Result<()> {
+struct Inputs {
+    raw: Option<Subscription<Image>>,
+    compressed: Option<Subscription<CompressedImage>>,
+    odometry: Subscription<Odometry>,
+    tires: Option<Subscription<PacejkaParams>>,
+    forget: Trigger,
+}
+
+async fn work(mut state: State, inputs: Inputs) -> anyhow::Result<()> {
+    let Inputs { mut raw, mut compressed, mut odometry, mut tires, mut forget } = inputs;
+    // What is being learned, beside the pictures' reading.
+    let mut learned: Option<JoinHandle<Option<Calibration>>> = None;
     let mut ticks = tokio::time::interval(Duration::from_secs(1));
     // After a stop of the process: one tick, not all those missed.
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -79,6 +98,20 @@ async fn work(
             Some(message) = odometry.next() => {
                 let sample = decode::odometry(&message);
                 state.odometer.push(sample.stamp_ns, sample.v_x_mps.hypot(sample.v_y_mps));
+                state.lateral_mps2 = sample.v_x_mps * sample.yaw_rate_radps;
+            }
+            Some(()) = forget.next() => {
+                learned = None;
+                state.forget();
+            }
+            Some(message) = next(&mut tires) => {
+                if state.taught_by(&message) {
+                    learned = Some(state.learn());
+                }
+            }
+            calibration = finished(&mut learned) => {
+                learned = None;
+                state.calibrated(calibration);
             }
             Some(first) = next(&mut compressed) => {
                 let message = state.newest(&mut compressed, first, |m| m.header.stamp).await;
@@ -110,12 +143,27 @@ async fn next<M>(subscription: &mut Option<Subscription<M>>) -> Option<M> {
     }
 }
 
+/// What was learned, once it is; never, where nothing is being learned.
+async fn finished(learned: &mut Option<JoinHandle<Option<Calibration>>>) -> Option<Calibration> {
+    match learned {
+        Some(task) => task.await.ok().flatten(),
+        None => std::future::pending().await,
+    }
+}
+
 struct State {
     estimator: FrictionEstimator,
     no_network: Option<String>,
     /// There is no network: the configured friction stands.
     configured: bool,
     odometer: Odometer,
+    /// Lateral acceleration by the last odometry.
+    lateral_mps2: f64,
+    learner: Learner,
+    learning: Learning,
+    lessons: u64,
+    /// The set of tires that taught last.
+    taught: Option<(String, u64)>,
     counts: Counts,
     /// The counts when the state was last reported.
     seen: Counts,
@@ -165,9 +213,66 @@ impl State {
         }
         self.counts.read += 1;
         self.counts.refused += u64::from(!estimate.valid());
+        self.learner.see(&estimate, motion.distance_m, self.lateral_mps2);
         self.frame_id = header.frame_id;
         self.friction.publish(&self.message(&estimate)).await;
         self.last = Some(estimate);
+    }
+
+    /// Whether a set of tires taught anything.
+    fn taught_by(&mut self, message: &PacejkaParams) -> bool {
+        let set = (message.handshake.run_id.clone(), message.handshake.sequence_id);
+        let Some(lesson) =
+            lesson(message, self.learning.lesson_ns).filter(|_| self.taught.as_ref() != Some(&set))
+        else {
+            return false;
+        };
+        self.taught = Some(set);
+        let pictures = self.learner.teach(&lesson);
+        tracing::info!(
+            "the tires say {:.2} +- {:.2} of the road: {pictures} pictures labelled",
+            lesson.friction.mu,
+            lesson.friction.sigma
+        );
+        self.lessons += u64::from(pictures > 0);
+        pictures > 0
+    }
+
+    /// Learns from all lessons so far, beside the node's other work.
+    fn learn(&self) -> JoinHandle<Option<Calibration>> {
+        let (learner, track) = (self.learner.clone(), self.learning.track.clone());
+        tokio::task::spawn_blocking(move || match learner.calibration(&track) {
+            Ok(calibration) => Some(calibration),
+            Err(error) => {
+                tracing::info!("not learned yet: {error}");
+                None
+            }
+        })
+    }
+
+    /// Takes what was learned, and keeps it.
+    fn calibrated(&mut self, calibration: Option<Calibration>) {
+        let Some(calibration) = calibration else { return };
+        if let Some(file) = &self.learning.file {
+            let made = file.parent().map_or(Ok(()), std::fs::create_dir_all);
+            let kept = made.map_err(anyhow::Error::from).and_then(|()| Ok(calibration.write_file(file)?));
+            if let Err(error) = kept {
+                tracing::error!("what the track taught is not kept in {}: {error:#}", file.display());
+            }
+        }
+        self.estimator.calibrate(Some(calibration));
+    }
+
+    fn forget(&mut self) {
+        self.learner.forget();
+        self.estimator.calibrate(None);
+        self.taught = None;
+        if let Some(file) = self.learning.file.as_ref().filter(|file| file.exists())
+            && let Err(error) = std::fs::remove_file(file)
+        {
+            tracing::error!("{} is not removed: {error}", file.display());
+        }
+        tracing::info!("forgotten what the track has taught");
     }
 
     /// Once a second: says how the node is, and publishes where no picture did.
@@ -178,7 +283,10 @@ impl State {
             self.friction.publish(&self.message(&estimate)).await;
             self.last = Some(estimate);
         }
+        let calibration = self.estimator.calibration().map(Calibration::hash).unwrap_or_default();
         let facts = Facts {
+            lessons: self.lessons,
+            calibration: &calibration,
             no_network: self.no_network.as_deref(),
             configured: self.configured,
             counts: self.counts,
@@ -220,6 +328,8 @@ impl State {
             entropy: estimate.entropy,
             distance_m: estimate.distance_m,
             pictures: estimate.pictures,
+            new_floor: estimate.new_floor(),
+            calibration: self.estimator.calibration().map(Calibration::hash).unwrap_or_default(),
         }
     }
 }

@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::Context as _;
 use gripsight_friction::{
-    Basis, FilterSettings, FrictionError, ModelLimits, Network, OnnxRuntime, Prior, QualityLimits, Region,
-    Settings, TransportLimits, find_library, find_model,
+    Basis, Calibration, FilterSettings, FrictionError, Look, ModelLimits, Network, OnnxRuntime, Prior,
+    QualityLimits, Settings, TransportLimits, find_library, find_model,
 };
 use gripsight_runtime::{Descriptor, Node};
 
@@ -17,6 +18,20 @@ pub(crate) struct Configuration {
     /// Picture topics to subscribe to: `both`, `raw`, `compressed` or `none`.
     pub(crate) input: String,
     pub(crate) publish_region: bool,
+    /// What the track has taught before.
+    pub(crate) calibration: Option<Calibration>,
+    pub(crate) learning: Learning,
+}
+
+/// How the node learns from the tires.
+pub(crate) struct Learning {
+    pub(crate) wanted: bool,
+    /// Driving that a set of tires rests on, nanoseconds.
+    pub(crate) lesson_ns: i64,
+    /// The track's name; empty without one.
+    pub(crate) track: String,
+    /// Where the track's calibration is kept; none without a track.
+    pub(crate) file: Option<PathBuf>,
 }
 
 /// Declares the parameters and loads what they name.
@@ -38,12 +53,11 @@ pub(crate) fn declare(node: &mut Node) -> anyhow::Result<Configuration> {
         }
         None => Basis::builtin()?,
     };
-    let edges = Descriptor::new("Part of the picture that shows road: left, top, right, bottom as shares")
-        .range(0.0..=1.0);
-    let edges = node.parameter("region", vec![0.0, 0.0, 1.0, 1.0], edges.read_only())?.get();
-    let [left, top, right, bottom] = edges[..] else {
-        anyhow::bail!("parameter region: expected 4 numbers, got {}", edges.len());
-    };
+    let region = Descriptor::new(
+        "Part of the picture that shows road: auto, full, or left,top,right,bottom as shares of width and height",
+    );
+    let region: Look = node.parameter("region", String::from("auto"), region.read_only())?.get().parse()?;
+    let (calibration, learning) = learning(node)?;
     let mut number = |name: &str, value: f64, text: &str, low: f64, high: f64| {
         let descriptor = Descriptor::new(text).range(low..=high).read_only();
         node.parameter(name, value, descriptor).map(|parameter| parameter.get())
@@ -51,7 +65,7 @@ pub(crate) fn declare(node: &mut Node) -> anyhow::Result<Configuration> {
     let (transport, quality, doubt, filter) =
         (default.transport, default.quality, default.model, default.filter);
     let settings = Settings {
-        region: Region::new(left, top, right, bottom)?,
+        region,
         transport: TransportLimits {
             most_age_s: number(
                 "most_age_s",
@@ -111,6 +125,7 @@ pub(crate) fn declare(node: &mut Node) -> anyhow::Result<Configuration> {
                 0.0,
                 255.0,
             )?,
+            ..quality
         },
         model: ModelLimits {
             most_least_probability: number(
@@ -145,6 +160,13 @@ pub(crate) fn declare(node: &mut Node) -> anyhow::Result<Configuration> {
             )?,
             ..filter
         },
+        network_error: number(
+            "network_error",
+            default.network_error,
+            "The least sigma of the network alone: its error on photographs of real roads",
+            0.0,
+            3.0,
+        )?,
         configured: Prior {
             mu: number(
                 "configured_mu",
@@ -175,7 +197,47 @@ pub(crate) fn declare(node: &mut Node) -> anyhow::Result<Configuration> {
         "none" => Ok(None),
         _ => network(library.as_deref(), model.as_deref(), beside).map(Some),
     };
-    Ok(Configuration { settings, basis, network, input, publish_region })
+    Ok(Configuration { settings, basis, network, input, publish_region, calibration, learning })
+}
+
+/// What the track has taught before, and how it goes on. A track's own file comes before the one that `calibration` names.
+fn learning(node: &mut Node) -> anyhow::Result<(Option<Calibration>, Learning)> {
+    let given =
+        path(node, "calibration", "What a track has taught, a file of `gripsight friction calibrate`")?;
+    let track =
+        Descriptor::new("The track's name: what is learned is kept under it; empty: for this run only");
+    let track = node.parameter("track", String::new(), track.read_only())?.get();
+    let folder = path(
+        node,
+        "track_folder",
+        "Where tracks are kept; empty: gripsight/tracks in XDG_DATA_HOME or ~/.local/share",
+    )?;
+    let wanted = Descriptor::new("Learn what the floors are worth from the tires").read_only();
+    let wanted = node.parameter("learn", true, wanted)?.get();
+    let lesson =
+        Descriptor::new("Driving that a set of tires rests on, telemetry's window_s [s]").range(1.0..=600.0);
+    let lesson_s = node.parameter("lesson_s", 30.0, lesson.read_only())?.get();
+    let file = match track.as_str() {
+        "" => None,
+        name if name.contains(['/', '\\']) || name.starts_with('.') => {
+            anyhow::bail!("parameter track: expected a plain name, got {name:?}")
+        }
+        name => Some(
+            folder
+                .or_else(usual_folder)
+                .context("parameter track_folder: there is no home folder")?
+                .join(format!("{name}.json")),
+        ),
+    };
+    let known = file.as_ref().filter(|file| file.is_file()).or(given.as_ref());
+    let calibration = known.map(|file| Calibration::read_file(file)).transpose()?;
+    Ok((calibration, Learning { wanted, lesson_ns: (lesson_s * 1e9) as i64, track, file }))
+}
+
+fn usual_folder() -> Option<PathBuf> {
+    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let data = set("XDG_DATA_HOME").or_else(|| set("HOME").map(|home| home.join(".local/share")))?;
+    Some(data.join("gripsight/tracks"))
 }
 
 fn network(

@@ -1,4 +1,4 @@
-//! The friction network, and the prior that a bag's pictures give.
+//! The friction network, a track's calibration, and the prior that a bag's pictures give.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -7,18 +7,30 @@ use anyhow::{Context, bail};
 use clap::Args;
 use gripsight_bag::{Bag, TopicMap, decode, from_cdr};
 use gripsight_friction::{
-    Basis, Estimate, Frame, FrameData, FrictionEstimator, Motion, Odometer, OnnxRuntime, RawPicture,
-    Settings, find_library, find_model,
+    Basis, Calibration, Estimate, Frame, FrameData, FrictionEstimator, Look, Motion, Odometer, OnnxRuntime,
+    RawPicture, Settings, find_library, find_model,
 };
 use gripsight_identification::FrictionPrior;
 use gripsight_msgs::Message;
 use gripsight_msgs::standard::nav_msgs::Odometry;
 use gripsight_msgs::standard::sensor_msgs::{CompressedImage, Image};
-use gripsight_msgs::standard::std_msgs::Header;
 
-/// Where the network and the library that runs it are.
+/// How pictures are read: the same wherever pictures are.
 #[derive(Debug, Args)]
-pub(crate) struct NetworkArgs {
+#[command(next_help_heading = "Pictures")]
+pub(crate) struct CameraArgs {
+    /// Part of the pictures that shows road: found (`auto`), all of it (`full`), or left,top,right,bottom as shares of width and height.
+    #[arg(long, value_name = "REGION", default_value = "auto", value_parser = look)]
+    region: Look,
+    /// Friction basis: what each road state is worth, as params/friction_basis.yaml, for the tires at hand.
+    #[arg(long, value_name = "FILE")]
+    basis: Option<PathBuf>,
+    /// What the track has taught: a file of `gripsight friction calibrate`.
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+    /// The pictures' topic, of a bag with several; without it the one with the most pictures.
+    #[arg(long, value_name = "TOPIC")]
+    image_topic: Option<String>,
     /// The trained network; found beside the program, in the installation or in the source tree by default.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
@@ -27,32 +39,57 @@ pub(crate) struct NetworkArgs {
     library: Option<PathBuf>,
 }
 
-/// Loads the network.
-pub(crate) fn estimator(args: &NetworkArgs) -> anyhow::Result<FrictionEstimator> {
-    let program = std::env::current_exe().context("cannot find out where this program is")?;
-    let folder = program.parent().unwrap_or(Path::new("."));
-    let library = find_library(args.library.as_deref(), folder)?;
-    let model = find_model(args.model.as_deref(), folder)?;
-    let network = OnnxRuntime::load(&library, &model)?;
-    Ok(FrictionEstimator::new(Settings::default(), Basis::builtin()?, Some(Box::new(network))))
+fn look(text: &str) -> Result<Look, String> {
+    text.parse().map_err(|error: gripsight_friction::FrictionError| error.to_string())
 }
 
-/// The mean of what the bag's pictures say, each at the distance that the odometry had by then.
-pub(crate) fn prior_of_bag(
+impl CameraArgs {
+    /// Loads basis, calibration and network.
+    pub(crate) fn estimator(&self) -> anyhow::Result<FrictionEstimator> {
+        let program = std::env::current_exe().context("cannot find out where this program is")?;
+        let folder = program.parent().unwrap_or(Path::new("."));
+        let basis = match &self.basis {
+            Some(path) => {
+                let text = std::fs::read_to_string(path)
+                    .with_context(|| format!("cannot read {}", path.display()))?;
+                Basis::from_yaml(&text).with_context(|| format!("cannot use {}", path.display()))?
+            }
+            None => Basis::builtin()?,
+        };
+        let calibration = self.calibration.as_deref().map(Calibration::read_file).transpose()?;
+        let library = find_library(self.library.as_deref(), folder)?;
+        let model = find_model(self.model.as_deref(), folder)?;
+        let network = OnnxRuntime::load(&library, &model)?;
+        let settings = Settings { region: self.region, ..Settings::default() };
+        let mut estimator = FrictionEstimator::new(settings, basis, Some(Box::new(network)));
+        estimator.calibrate(calibration);
+        Ok(estimator)
+    }
+}
+
+/// A picture of a bag.
+pub(crate) struct Shot<'a> {
+    /// Its stamp.
+    pub(crate) stamp_ns: i64,
+    /// Its bytes.
+    pub(crate) data: FrameData<'a>,
+    /// What the odometry had measured by then.
+    pub(crate) motion: Motion,
+}
+
+/// Hands every picture of one topic of a bag to `take`, in the order recorded; gives the topic.
+pub(crate) fn each_picture(
     path: &Path,
     topics: &TopicMap,
-    args: &NetworkArgs,
-) -> anyhow::Result<FrictionPrior> {
+    args: &CameraArgs,
+    mut take: impl FnMut(&Shot<'_>) -> anyhow::Result<()>,
+) -> anyhow::Result<String> {
     let bag = Bag::open(path)?;
-    let is_picture = |name: &str| name == Image::TYPE || name == CompressedImage::TYPE;
-    if !bag.topics().iter().any(|t| is_picture(&t.type_name)) {
-        bail!("{}: no topic with pictures ({} or {})", path.display(), Image::TYPE, CompressedImage::TYPE);
-    }
+    let wanted = choose_topic(&bag, args)?;
     let streams = topics.resolve(&bag).ok();
     let odometry = streams.as_ref().and_then(|s| s.topic(gripsight_bag::Role::Odom));
-    let mut estimator = estimator(args)?;
+    let raw = bag.topics().iter().any(|t| t.name == wanted && t.type_name == Image::TYPE);
     let mut odometer = Odometer::default();
-    let mut seen = Seen::default();
     for message in bag.messages() {
         let message = match message {
             Ok(message) => message,
@@ -60,19 +97,11 @@ pub(crate) fn prior_of_bag(
             Err(error) => return Err(error.into()),
         };
         let (topic, data) = (message.channel.topic.as_str(), &message.data);
-        let type_name = bag.topics().iter().find(|t| t.name == topic).map_or("", |t| &t.type_name);
-        if odometry == Some(topic) {
-            let odometry: Odometry = from_cdr(data)?;
-            odometer.push(decode::stamp_ns(odometry.header.stamp), odometry.twist.twist.linear.x);
-        } else if type_name == CompressedImage::TYPE {
-            let picture: CompressedImage = from_cdr(data)?;
-            seen.take(&update(
-                &mut estimator,
-                &odometer,
-                &picture.header,
-                FrameData::Compressed(&picture.data),
-            ));
-        } else if type_name == Image::TYPE {
+        let mut shot = |stamp, data: FrameData<'_>| {
+            let stamp_ns = decode::stamp_ns(stamp);
+            take(&Shot { stamp_ns, data, motion: Motion { distance_m: odometer.at(stamp_ns) } })
+        };
+        if topic == wanted && raw {
             let picture: Image = from_cdr(data)?;
             let raw = RawPicture {
                 width: picture.width,
@@ -82,29 +111,75 @@ pub(crate) fn prior_of_bag(
                 big_endian: picture.is_bigendian != 0,
                 data: &picture.data,
             };
-            seen.take(&update(&mut estimator, &odometer, &picture.header, FrameData::Raw(raw)));
+            shot(picture.header.stamp, FrameData::Raw(raw))?;
+        } else if topic == wanted {
+            let picture: CompressedImage = from_cdr(data)?;
+            shot(picture.header.stamp, FrameData::Compressed(&picture.data))?;
+        } else if odometry == Some(topic) {
+            // A stack's own type has no speed here: pictures are then averaged by number.
+            if let Ok(odometry) = from_cdr::<Odometry>(data) {
+                odometer.push(decode::stamp_ns(odometry.header.stamp), odometry.twist.twist.linear.x);
+            }
         }
     }
-    seen.mean().with_context(|| format!("{}: no picture tells the friction", path.display()))
+    Ok(wanted)
 }
 
-fn update(
-    estimator: &mut FrictionEstimator,
-    odometer: &Odometer,
-    header: &Header,
-    data: FrameData<'_>,
-) -> Estimate {
-    let stamp_ns = decode::stamp_ns(header.stamp);
-    let motion = Motion { distance_m: odometer.at(stamp_ns) };
-    estimator.update(&Frame { stamp_ns, data }, stamp_ns, &motion)
+/// The topic asked for, the only one, or the one with the most pictures: two cameras are two streams.
+fn choose_topic(bag: &Bag, args: &CameraArgs) -> anyhow::Result<String> {
+    let path = bag.path().display();
+    let is_picture = |name: &str| name == Image::TYPE || name == CompressedImage::TYPE;
+    let mut counts: BTreeMap<&str, usize> =
+        bag.topics().iter().filter(|t| is_picture(&t.type_name)).map(|t| (t.name.as_str(), 0)).collect();
+    let names = counts.keys().copied().collect::<Vec<_>>().join(", ");
+    if let Some(wanted) = &args.image_topic {
+        if !counts.contains_key(wanted.as_str()) {
+            bail!(
+                "{path}: no pictures on {wanted} (there are: {})",
+                if names.is_empty() { "none" } else { &names }
+            );
+        }
+        return Ok(wanted.clone());
+    }
+    if counts.len() > 1 {
+        for message in bag.messages().map_while(Result::ok) {
+            if let Some(count) = counts.get_mut(message.channel.topic.as_str()) {
+                *count += 1;
+            }
+        }
+    }
+    let Some((most, _)) = counts.iter().max_by_key(|(_, count)| **count) else {
+        bail!("{path}: no topic with pictures ({} or {})", Image::TYPE, CompressedImage::TYPE);
+    };
+    if counts.len() > 1 {
+        tracing::warn!("{path}: pictures on {names}: taking {most}; --image-topic chooses");
+    }
+    Ok((*most).to_owned())
+}
+
+/// The mean of what the bag's pictures say, each at the distance that the odometry had by then.
+pub(crate) fn prior_of_bag(
+    path: &Path,
+    topics: &TopicMap,
+    args: &CameraArgs,
+) -> anyhow::Result<FrictionPrior> {
+    let mut estimator = args.estimator()?;
+    let mut seen = Seen::default();
+    each_picture(path, topics, args, |shot| {
+        let frame = Frame { stamp_ns: shot.stamp_ns, data: shot.data };
+        seen.take(&estimator.update(&frame, shot.stamp_ns, &shot.motion));
+        Ok(())
+    })?;
+    seen.mean().with_context(|| format!("{}: no picture tells the friction", path.display()))
 }
 
 /// Sums over pictures.
 #[derive(Default)]
 struct Seen {
     valid: usize,
+    new_floor: usize,
     mu: f64,
-    sigma: f64,
+    second: f64,
     refused: BTreeMap<&'static str, usize>,
 }
 
@@ -113,8 +188,9 @@ impl Seen {
         match estimate.reason {
             None => {
                 self.valid += 1;
+                self.new_floor += usize::from(estimate.new_floor());
                 self.mu += estimate.mu;
-                self.sigma += estimate.sigma;
+                self.second += estimate.mu.powi(2) + estimate.sigma.powi(2);
             }
             Some(reason) => *self.refused.entry(reason.as_str()).or_default() += 1,
         }
@@ -126,10 +202,16 @@ impl Seen {
             bail!("{}", if refused.is_empty() { "there is none".to_owned() } else { refused });
         }
         let count = self.valid as f64;
-        let prior = FrictionPrior { mu: self.mu / count, sigma: self.sigma / count };
+        let mu = self.mu / count;
+        // Two surfaces in one bag are one wide prior.
+        let prior = FrictionPrior { mu, sigma: (self.second / count - mu * mu).max(0.0).sqrt() };
         let rest = if refused.is_empty() { String::new() } else { format!("; not used: {refused}") };
+        let new = match self.new_floor {
+            0 => String::new(),
+            n => format!("; {n} show a floor that the calibration has not seen"),
+        };
         tracing::info!(
-            "friction prior {:.2} +- {:.2} from {} pictures{rest}",
+            "friction prior {:.2} +- {:.2} from {} pictures{new}{rest}",
             prior.mu,
             prior.sigma,
             self.valid

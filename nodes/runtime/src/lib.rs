@@ -28,7 +28,7 @@
 //! }
 //! ```
 //!
-//! Not implemented: lifecycle nodes, composition, actions, services of a node's own, and type
+//! Not implemented: lifecycle nodes, composition, actions, services of a node's own other than triggers, and type
 //! hashes in discovery (ros2-client cannot announce them; both RMWs of ROS 2 Jazzy accept that).
 
 mod args;
@@ -60,7 +60,7 @@ pub use diagnostics::{Diagnostics, Level, Status};
 pub use error::Error;
 pub use inputs::Arrivals;
 pub use manual::manual_covers;
-pub use node::Node;
+pub use node::{Node, Trigger};
 pub use parameters::{Descriptor, Parameter};
 pub use publisher::{Publisher, RawPublisher};
 pub use qos::Qos;

@@ -11,7 +11,7 @@ use gripsight_msgs::standard::diagnostic_msgs::DiagnosticArray;
 use gripsight_msgs::standard::rcl_interfaces::Log;
 use gripsight_msgs::standard::rosgraph_msgs::Clock as ClockMessage;
 use gripsight_msgs::standard::std_msgs::Header;
-use ros2_client::Context;
+use ros2_client::{Context, ServiceMapping};
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
 
@@ -25,7 +25,7 @@ use crate::guard::Guard;
 use crate::inputs::{self, Arrivals};
 use crate::logging;
 use crate::names::Identity;
-use crate::parameter_services::ParameterServices;
+use crate::parameter_services::{ParameterServices, serve_trigger};
 use crate::parameters::{Descriptor, Parameter, ParameterStore};
 use crate::publisher::{PATIENCE, Publisher, REPLAY_PATIENCE, RawCdr, RawPublisher};
 use crate::qos::Qos;
@@ -46,6 +46,19 @@ pub(crate) enum Ended<E> {
     Deaf,
 }
 
+/// Calls of a service that only triggers.
+#[derive(Debug)]
+pub struct Trigger {
+    calls: mpsc::Receiver<()>,
+}
+
+impl Trigger {
+    /// The next call; none once the node ends.
+    pub async fn next(&mut self) -> Option<()> {
+        self.calls.recv().await
+    }
+}
+
 /// A running node.
 pub struct Node {
     identity: Identity,
@@ -59,6 +72,7 @@ pub struct Node {
     ros: Arc<Mutex<ros2_client::Node>>,
     context: Context,
     domain_id: u16,
+    service_mappings: Vec<ServiceMapping>,
     /// Parameters that `/parameter_events` is to be told of.
     changes: Option<mpsc::Sender<(String, ParameterValue)>>,
 }
@@ -108,6 +122,7 @@ impl Node {
             ros: Arc::new(Mutex::new(ros)),
             context,
             domain_id: environment.domain_id,
+            service_mappings: environment.service_mappings.clone(),
             changes: None,
         };
         tokio::spawn(async move {
@@ -208,6 +223,24 @@ impl Node {
         let arrivals = Arrivals::new(topic.clone(), M::TYPE, qos);
         self.tasks.spawn(forward(reader, topic.clone(), arrivals.clone(), sender, diagnostics, stop));
         Ok(Subscription { topic, messages, arrivals })
+    }
+
+    /// Offers a service of type std_srvs/srv/Trigger (relative, `~/` private, or absolute); `done` is what its reply says.
+    ///
+    /// # Errors
+    /// [`Error::Name`], or [`Error::Create`] when DDS refuses.
+    pub fn trigger(&mut self, name: &str, done: &'static str) -> Result<Trigger, Error> {
+        let name = self.identity.resolve(name)?;
+        let participant = self.context.domain_participant();
+        let (sender, calls) = mpsc::channel(WAITING_CHANGES);
+        for mapping in self.service_mappings.clone() {
+            let serving = {
+                let mut ros = self.ros.lock().unwrap_or_else(PoisonError::into_inner);
+                serve_trigger(&mut ros, &name, mapping, &participant, done, sender.clone())?
+            };
+            self.spawn(serving);
+        }
+        Ok(Trigger { calls })
     }
 
     /// States that the node can do nothing without messages on one of these topics. Where none has come for five seconds a line in the

@@ -1,4 +1,4 @@
-//! The six services by which `ros2 param` reads and sets a node's parameters.
+//! The six services by which `ros2 param` reads and sets a node's parameters, and services of a node's own that only trigger.
 //!
 //! ros2-client's own services know one mapping of services to DDS only, and no descriptors. A request does not say by which mapping it
 //! was made; the vendor at the front of its writer's GUID does (RTPS 2.5, 9.3.1.5).
@@ -46,6 +46,26 @@ service_messages! {
     ListRequest { prefixes: Vec<String>, depth: u64 }
     ListResponse { result: rcl::ListParametersResult }
     DescribeResponse { descriptors: Vec<rcl::ParameterDescriptor> }
+    TriggerRequest { structure_needs_at_least_one_member: u8 }
+    TriggerResponse { success: bool, message: String }
+}
+
+/// Creates a service of type std_srvs/srv/Trigger under its absolute name, and gives the future that answers it: each call is handed on, and `done` is
+/// the reply's text.
+pub(crate) fn serve_trigger(
+    node: &mut ros2_client::Node,
+    name: &str,
+    mapping: ServiceMapping,
+    participant: &DomainParticipant,
+    done: &'static str,
+    calls: mpsc::Sender<()>,
+) -> Result<impl Future<Output = ()> + use<>, Error> {
+    let server =
+        server::<TriggerRequest, TriggerResponse>(node, name, ("std_srvs", "Trigger"), mapping, participant)?;
+    Ok(answer(server, move |_: TriggerRequest| {
+        let success = calls.try_send(()).is_ok();
+        TriggerResponse { success, message: if success { done } else { "too many calls" }.to_owned() }
+    }))
 }
 
 /// Answers requests about a node's parameters.
@@ -164,17 +184,30 @@ impl Factory<'_> {
         A: Message + 'static,
     {
         let name = self.identity.resolve(&format!("~/{name}"))?;
-        let ros_name = Name::parse(&name).map_err(|error| Error::create(&name, error))?;
-        let type_name = ServiceTypeName::new("rcl_interfaces", type_name);
-        let qos = Qos::reliable(10).profile();
-        let server = self
-            .node
-            .create_server(self.mapping, &ros_name, &type_name, qos.clone(), qos)
-            .map_err(|error| Error::create(format!("service {name}"), error))?;
-        let participant = self.participant.clone();
-        let replies = Replies { participant, topic: format!("rr{name}Reply") };
-        Ok(Service { server, replies, mapping: self.mapping })
+        server(self.node, &name, ("rcl_interfaces", type_name), self.mapping, self.participant)
     }
+}
+
+/// A service under its absolute name, of a package's type.
+fn server<Q, A>(
+    node: &mut ros2_client::Node,
+    name: &str,
+    type_name: (&str, &str),
+    mapping: ServiceMapping,
+    participant: &DomainParticipant,
+) -> Result<Service<Q, A>, Error>
+where
+    Q: Message + Clone + 'static,
+    A: Message + 'static,
+{
+    let ros_name = Name::parse(name).map_err(|error| Error::create(name, error))?;
+    let type_name = ServiceTypeName::new(type_name.0, type_name.1);
+    let qos = Qos::reliable(10).profile();
+    let server = node
+        .create_server(mapping, &ros_name, &type_name, qos.clone(), qos)
+        .map_err(|error| Error::create(format!("service {name}"), error))?;
+    let replies = Replies { participant: participant.clone(), topic: format!("rr{name}Reply") };
+    Ok(Service { server, replies, mapping })
 }
 
 struct Service<Q, A>
@@ -231,11 +264,11 @@ where
                 let response = respond(request);
                 replies.are_read_by(&id).await;
                 if let Err(error) = server.async_send_response(id, response).await {
-                    tracing::warn!("cannot answer a parameter request: {error}");
+                    tracing::warn!("cannot answer a request: {error}");
                 }
             }
             // As a rule one that was made by the other mapping.
-            Err(error) => tracing::debug!("cannot read a parameter request: {error}"),
+            Err(error) => tracing::debug!("cannot read a request: {error}"),
         }
     }
 }

@@ -6,7 +6,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use gripsight_msgs::standard::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use gripsight_msgs::standard::sensor_msgs::CompressedImage;
-use gripsight_msgs::{FrictionPrior, Message};
+use gripsight_msgs::{FrictionPrior, Interval, Message, PacejkaParams, PeakFriction};
 use gripsight_tests::domain::Domain;
 use gripsight_tests::peers::{PATIENCE, available, cyclone, message, start_cyclone};
 use gripsight_tests::process::{Process, node};
@@ -88,7 +88,7 @@ fn a_peer_s_pictures_are_read_and_broken_ones_refused() {
     // The peer starts to send once it has found the node, so its stamps may be old, and the second is ahead by one.
     let age = ["-p", "most_age_s:=60.0", "-p", "most_ahead_s:=5.0"];
     let files = ["-p", &library, "-p", &model];
-    let region = ["-p", "publish_region:=true", "-p", "region:=[0.1, 0.3, 0.9, 0.95]"];
+    let region = ["-p", "publish_region:=true", "-p", "region:=0.1,0.3,0.9,0.95"];
     let _node = node(&domain, "camera_prior", &[&age[..], &files, &region].concat());
     let topic = ["publish", "/image/compressed", CompressedImage::TYPE, "--qos", "sensor", "--period", "1"];
     let mut peer = start_cyclone(&domain, &python, &topic);
@@ -189,4 +189,53 @@ fn after_a_slow_picture_the_newest_is_read_and_those_that_waited_are_not() {
     );
     // There was a queue to be dropped.
     assert!(number("pictures dropped for newer ones", 1.0) >= 1.0);
+}
+
+#[test]
+fn the_tires_teach_the_camera_and_it_can_be_told_to_forget() {
+    let Ok(python) = cyclone() else {
+        available(&[cyclone()]);
+        return;
+    };
+    let Some([library, model]) = engine() else { return };
+    let domain = Domain::new();
+    let listener = listen(&domain, &python, FRICTION, FrictionPrior::TYPE, "reliable");
+    let tracks = tempfile::tempdir().unwrap();
+    let folder = format!("track_folder:={}", tracks.path().display());
+    let files = ["-p", &library, "-p", &model, "-p", "region:=full"];
+    let track = ["-p", "track:=lab", "-p", &folder];
+    let _node = node(&domain, "camera_prior", &[&files[..], &track].concat());
+    let topic = ["publish", "/image/compressed", CompressedImage::TYPE, "--qos", "sensor", "--stamp"];
+    let pace = ["--period", "0.1", "--times", "2000"];
+    let mut camera = start_cyclone(&domain, &python, &[&topic[..], &pace].concat());
+    camera.feed(&line(&road("road.png"), 0));
+    let before = prior(&listener, |p| p.valid && p.source == FrictionPrior::CAMERA);
+    assert!(before.calibration.is_empty() && before.sigma > 0.25, "{before:?}");
+    // Pictures of two seconds, then a set of tires whose peak was reached at 0.35: a road of 0.4.
+    (0..20).for_each(|_| drop(message::<FrictionPrior>(&listener)));
+    let friction = Interval { value: 0.35, low: 0.33, high: 0.37 };
+    let peak = PeakFriction { friction, reached: true, from_prior: false };
+    let mut set = PacejkaParams {
+        status: PacejkaParams::ACCEPTED,
+        front_peak: peak,
+        rear_peak: peak,
+        ..PacejkaParams::default()
+    };
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
+    set.header.stamp.sec = now.as_secs() as i32 + 10;
+    set.handshake.run_id = "a run".to_owned();
+    let topic = ["publish", "/pacejka", PacejkaParams::TYPE, "--qos", "latched"];
+    let mut identifier = start_cyclone(&domain, &python, &topic);
+    identifier.feed(&(serde_json::to_string(&set).unwrap() + "\n"));
+    let taught = (0..100).map(|_| message::<FrictionPrior>(&listener)).find(|p| !p.calibration.is_empty());
+    let settled = (0..15).map(|_| message::<FrictionPrior>(&listener)).reduce(|_, next| next).unwrap();
+    assert!(taught.is_some() && (settled.mu - 0.4).abs() < 0.05 && settled.sigma < 0.15, "{settled:?}");
+    assert!(!settled.new_floor && tracks.path().join("lab.json").is_file());
+
+    let request = r#"{"structure_needs_at_least_one_member": 0}"#;
+    let call = ["call", "/camera_prior/forget", "std_srvs/srv/Trigger", request];
+    let reply: serde_json::Value = message(&start_cyclone(&domain, &python, &call));
+    assert_eq!(reply["success"], true, "{reply}");
+    let forgotten = (0..100).map(|_| message::<FrictionPrior>(&listener)).find(|p| p.calibration.is_empty());
+    assert!(forgotten.is_some() && !tracks.path().join("lab.json").exists());
 }

@@ -24,7 +24,7 @@ use gripsight_signals::{StateSequence, WindowConfig};
 use gripsight_vehicle::VehicleParameters;
 
 use crate::Outcome;
-use crate::camera::{NetworkArgs, prior_of_bag};
+use crate::camera::{CameraArgs, prior_of_bag};
 use crate::data::{notes as signal_notes, with_checks};
 use crate::diagnose::extended_model;
 use crate::invocation::{file_name, invocation};
@@ -109,7 +109,7 @@ pub(crate) struct IdentifyArgs {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
-    network: NetworkArgs,
+    pictures: CameraArgs,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -164,7 +164,14 @@ impl IdentifyArgs {
 
     fn prior(&self, topics: &TopicMap) -> anyhow::Result<Option<FrictionPrior>> {
         if self.camera {
-            return prior_of_bag(self.bag(), topics, &self.network).map(Some);
+            return Ok(match prior_of_bag(self.bag(), topics, &self.pictures) {
+                Ok(prior) => Some(prior),
+                // The data alone are judged first: a prior is one set more, and its lack is no reason to lose the other.
+                Err(error) => {
+                    tracing::warn!("no friction prior: {error:#}; identified without one");
+                    None
+                }
+            });
         }
         Ok(self.prior_mu.map(|mu| FrictionPrior { mu, sigma: self.prior_sigma }))
     }

@@ -115,14 +115,5 @@ fn decode_compressed(bytes: &[u8], region: &Region) -> Result<RgbPicture, Fricti
     let (width, height) = decoder.dimensions();
     check_size(width, height)?;
     let whole = image::DynamicImage::from_decoder(decoder).map_err(|e| undecodable(e.to_string()))?;
-    let rgb = whole.into_rgb8().into_raw();
-    let (x, y, w, h) = region.pixels(width, height);
-    if (w, h) == (width, height) {
-        return Ok(RgbPicture { width, height, data: rgb });
-    }
-    let mut data = Vec::with_capacity((w * h * 3) as usize);
-    for row in rgb.chunks_exact(width as usize * 3).skip(y as usize).take(h as usize) {
-        data.extend_from_slice(&row[x as usize * 3..(x + w) as usize * 3]);
-    }
-    Ok(RgbPicture { width: w, height: h, data })
+    Ok(RgbPicture { width, height, data: whole.into_rgb8().into_raw() }.crop(region))
 }

@@ -67,6 +67,14 @@ pub enum FrictionError {
         /// Bottom edge as a share of the height.
         bottom: f64,
     },
+    /// A region's text is neither a word nor four edges.
+    #[error(
+        "region {text:?}: expected auto, full, or left,top,right,bottom as shares of width and height, such as 0.2,0.5,0.8,0.9"
+    )]
+    UnreadableRegion {
+        /// The text.
+        text: String,
+    },
     /// The crop could not be resized.
     #[error("resizing the region of interest failed: {message}")]
     Resize {
@@ -79,9 +87,23 @@ pub enum FrictionError {
         /// What is wrong.
         message: String,
     },
+    /// A calibration cannot be learned, or its file is not usable.
+    #[error("friction calibration: {message}")]
+    BadCalibration {
+        /// What is wrong.
+        message: String,
+    },
     /// A file could not be read.
     #[error("cannot read {path}")]
     Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A file could not be written.
+    #[error("cannot write {path}")]
+    Write {
         /// The file.
         path: PathBuf,
         /// Why.

@@ -1,5 +1,7 @@
 //! What the pipeline says: a prior, where it comes from, and why it is not usable.
 
+use crate::appearance::APPEARANCE;
+use crate::calibration::Known;
 use crate::error::FrictionError;
 use crate::quality::QualityStatistics;
 
@@ -58,6 +60,12 @@ impl Reason {
         }
     }
 
+    /// Whether the picture itself, not the network, is why: too late, broken, dark, blurred.
+    #[must_use]
+    pub fn is_of_the_picture(self) -> bool {
+        !matches!(self, Self::Undecided | Self::Unfamiliar | Self::NetworkFailed)
+    }
+
     pub(crate) fn of_error(error: &FrictionError) -> Self {
         match error {
             FrictionError::UnknownEncoding { .. } => Self::UnknownEncoding,
@@ -104,6 +112,12 @@ pub struct Estimate {
     pub unfamiliarity: Option<f64>,
     /// Statistics of the newest picture's region of interest.
     pub quality: Option<QualityStatistics>,
+    /// What the newest picture's region looks like; none where no picture could be read.
+    pub appearance: Option<[f64; APPEARANCE.len()]>,
+    /// What the network alone says of the newest picture; none where it was not asked, or is not believed.
+    pub network_mu: Option<f64>,
+    /// What the calibration says of it; none without one.
+    pub known: Option<Known>,
     /// Distance that the average spans, metres.
     pub distance_m: f64,
     /// Pictures in the average.
@@ -115,5 +129,11 @@ impl Estimate {
     #[must_use]
     pub fn valid(&self) -> bool {
         self.reason.is_none()
+    }
+
+    /// Whether there is a calibration, and the newest picture shows a floor that it has not seen.
+    #[must_use]
+    pub fn new_floor(&self) -> bool {
+        self.known.is_some_and(|known| known.distance > 1.0)
     }
 }

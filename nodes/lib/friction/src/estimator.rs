@@ -1,14 +1,17 @@
 //! The whole pipeline: a frame in, a friction prior out.
 
+use crate::appearance::{APPEARANCE, appearance};
 use crate::basis::{Basis, Prior};
+use crate::calibration::{Calibration, Known};
 use crate::decode::decode;
 use crate::error::FrictionError;
 use crate::estimate::{Estimate, Reason, Source};
 use crate::filter::DistanceFilter;
+use crate::look::{Look, RoadFinder};
 use crate::network::{Answer, Network};
-use crate::picture::{Frame, RgbPicture};
+use crate::picture::{Frame, FrameData, Region, RgbPicture};
 use crate::quality::QualityStatistics;
-use crate::settings::Settings;
+use crate::settings::{ModelLimits, Settings};
 use crate::tensor::{Preprocessor, normalise};
 use crate::transport::TransportGate;
 
@@ -27,6 +30,8 @@ pub struct FrictionEstimator {
     preprocessor: Preprocessor,
     transport: TransportGate,
     filter: DistanceFilter,
+    finder: RoadFinder,
+    calibration: Option<Calibration>,
     seen: Option<RgbPicture>,
 }
 
@@ -39,10 +44,14 @@ impl std::fmt::Debug for FrictionEstimator {
 /// What one picture says on its own.
 struct Reading {
     p: Vec<f64>,
+    prior: Prior,
     entropy: f64,
     energy: f64,
     unfamiliarity: Option<f64>,
     quality: QualityStatistics,
+    appearance: [f64; APPEARANCE.len()],
+    network_mu: Option<f64>,
+    known: Option<Known>,
     refused: Option<Reason>,
 }
 
@@ -57,8 +66,21 @@ impl FrictionEstimator {
             preprocessor: Preprocessor::default(),
             transport: TransportGate::default(),
             filter: DistanceFilter::default(),
+            finder: RoadFinder::default(),
+            calibration: None,
             seen: None,
         }
+    }
+
+    /// Takes what a track has taught; none leaves the network alone.
+    pub fn calibrate(&mut self, calibration: Option<Calibration>) {
+        self.calibration = calibration;
+    }
+
+    /// What the track has taught.
+    #[must_use]
+    pub fn calibration(&self) -> Option<&Calibration> {
+        self.calibration.as_ref()
     }
 
     /// The friction basis in use.
@@ -71,6 +93,7 @@ impl FrictionEstimator {
     pub fn reset(&mut self) {
         self.transport = TransportGate::default();
         self.filter = DistanceFilter::default();
+        self.finder = RoadFinder::default();
     }
 
     /// The last region of interest as the network saw it.
@@ -111,13 +134,21 @@ impl FrictionEstimator {
             estimate.energy = reading.energy;
             estimate.unfamiliarity = reading.unfamiliarity;
             estimate.quality = Some(reading.quality);
+            estimate.appearance = Some(reading.appearance);
+            estimate.network_mu = reading.network_mu;
+            estimate.known = reading.known;
             estimate
         };
         if let Some(reason) = reading.refused {
             return seen(self.refuse(stamp, reason, None));
         }
-        let p = self.filter.update(&self.settings.filter, &reading.p, motion.distance_m).to_vec();
-        let Prior { mu, sigma } = self.basis.prior(&p);
+        // The first two moments beside p: the spread between pictures then counts in sigma.
+        let Prior { mu, sigma } = reading.prior;
+        let numbers = [&reading.p[..], &[mu, mu * mu + sigma * sigma]].concat();
+        let mut p = self.filter.update(&self.settings.filter, &numbers, motion.distance_m).to_vec();
+        let [mu, second] = [p.len() - 2, p.len() - 1].map(|k| p[k]);
+        p.truncate(reading.p.len());
+        let sigma = (second - mu * mu).max(0.0).sqrt();
         seen(Estimate {
             stamp_ns: stamp,
             source: Source::Camera,
@@ -130,6 +161,9 @@ impl FrictionEstimator {
             energy: 0.0,
             unfamiliarity: None,
             quality: None,
+            appearance: None,
+            network_mu: None,
+            known: None,
             distance_m: self.filter.span_m(&self.settings.filter),
             pictures: self.filter.pictures(),
         })
@@ -141,46 +175,87 @@ impl FrictionEstimator {
         self.update(frame, frame.stamp_ns, &Motion::default())
     }
 
-    /// Decode, look, ask.
+    /// Decode, look, ask the network and the calibration.
     fn read(&mut self, frame: &Frame<'_>) -> Result<Reading, FrictionError> {
-        let crop = decode(&frame.data, &self.settings.region)?;
+        let crop = self.crop(&frame.data)?;
         let input = self.seen.insert(self.preprocessor.resize(&crop)?);
         let quality = QualityStatistics::measure(input);
-        let classes = self.basis.classes.len();
-        let unread = |reason| Reading {
-            p: vec![1.0 / classes as f64; classes],
+        let appearance = appearance(input);
+        let mut reading = Reading {
+            p: self.flat(),
+            prior: self.basis.uninformative,
             entropy: 1.0,
             energy: 0.0,
             unfamiliarity: None,
             quality,
-            refused: Some(reason),
+            appearance,
+            network_mu: None,
+            known: None,
+            refused: self.settings.quality.check(&quality),
         };
-        if let Some(reason) = self.settings.quality.check(&quality) {
-            return Ok(unread(reason));
+        if reading.refused.is_none() {
+            reading.known = self.calibration.as_ref().map(|c| c.read(&appearance));
+            self.ask(&mut reading)?;
         }
-        let tensor = normalise(input);
-        let Some(network) = self.network.as_mut() else {
-            return Ok(unread(Reason::NetworkFailed));
+        Ok(reading)
+    }
+
+    fn crop(&mut self, data: &FrameData<'_>) -> Result<RgbPicture, FrictionError> {
+        match &self.settings.region {
+            Look::At(region) => decode(data, region),
+            Look::Auto if self.finder.wants_a_look() => {
+                let whole = decode(data, &Region::WHOLE)?;
+                self.finder.look(&whole);
+                let region = self.finder.region().unwrap_or(Region::WHOLE);
+                Ok(whole.crop(&region))
+            }
+            Look::Auto => decode(data, &self.finder.region().unwrap_or(Region::WHOLE)),
+        }
+    }
+
+    /// Fills in what the network says, and joins it with what the calibration does.
+    fn ask(&mut self, reading: &mut Reading) -> Result<(), FrictionError> {
+        let (Some(network), Some(input)) = (self.network.as_mut(), self.seen.as_ref()) else {
+            reading.refused = Some(Reason::NetworkFailed);
+            return Ok(());
         };
-        let Answer { logits, unfamiliarity } = network.read(&tensor)?;
+        let classes = self.basis.classes.len();
+        let Answer { logits, unfamiliarity } = network.read(&normalise(input))?;
         let unfamiliarity = unfamiliarity.map(f64::from);
         if logits.len() != classes || !logits.iter().all(|z| z.is_finite()) {
             let message = format!("expected {classes} finite logits, got {logits:?}");
             return Err(FrictionError::Inference { message });
         }
         let (p, energy) = softmax(&logits);
-        let entropy =
+        reading.entropy =
             -p.iter().filter(|p| **p > 0.0).map(|p| p * p.ln()).sum::<f64>() / (classes as f64).ln();
+        (reading.energy, reading.unfamiliarity) = (energy, unfamiliarity);
         let limits = &self.settings.model;
         let strange = unfamiliarity.is_some_and(|d| d.is_nan() || d > limits.most_unfamiliarity);
-        let refused = if p.iter().all(|p| *p > limits.most_least_probability) {
+        let doubt = if p.iter().all(|p| *p > limits.most_least_probability) {
             Some(Reason::Undecided)
         } else if energy > limits.most_energy || strange {
             Some(Reason::Unfamiliar)
         } else {
             None
         };
-        Ok(Reading { p, entropy, energy, unfamiliarity, quality, refused })
+        let network = match doubt {
+            Some(_) => self.basis.uninformative,
+            None => {
+                let Prior { mu, sigma } = self.basis.prior(&p);
+                reading.network_mu = Some(mu);
+                let error =
+                    self.calibration.as_ref().map_or(self.settings.network_error, |c| c.errors().network);
+                let strangeness = unfamiliarity.unwrap_or(0.0) / ModelLimits::USUAL_UNFAMILIARITY;
+                Prior { mu, sigma: sigma.max(error * strangeness.max(1.0)) }
+            }
+        };
+        reading.p = p;
+        let weight = reading.known.map_or(0.0, |known| known.weight());
+        // A floor that the track has taught needs no network.
+        reading.refused = doubt.filter(|_| weight < 0.5);
+        reading.prior = reading.known.map_or(network, |known| joined(&known, weight, network));
+        Ok(())
     }
 
     fn flat(&self) -> Vec<f64> {
@@ -219,10 +294,21 @@ impl FrictionEstimator {
             energy: 0.0,
             unfamiliarity: None,
             quality: None,
+            appearance: None,
+            network_mu: None,
+            known: None,
             distance_m: 0.0,
             pictures: 0,
         }
     }
+}
+
+/// The mixture of what the calibration says, with its weight, and what the network says.
+fn joined(known: &Known, weight: f64, network: Prior) -> Prior {
+    let mu = weight * known.mu + (1.0 - weight) * network.mu;
+    let second = weight * (known.sigma.powi(2) + known.mu.powi(2))
+        + (1.0 - weight) * (network.sigma.powi(2) + network.mu.powi(2));
+    Prior { mu, sigma: (second - mu * mu).max(0.0).sqrt() }
 }
 
 /// p and the energy -ln sum exp z, free of overflow.

@@ -1,4 +1,4 @@
-//! The average of p over the distance travelled.
+//! The average of p, and of what follows from it, over the distance travelled.
 //!
 //! A picture counts by the new road that it shows, not by the time that passed: at a standstill p hardly moves, and after a
 //! change of surface it follows within the same stretch of road at any speed.
@@ -21,7 +21,7 @@ pub struct FilterSettings {
 
 impl Default for FilterSettings {
     fn default() -> Self {
-        Self { length_m: 4.0, least_gain: 0.02, blind_gain: 0.2, forget_after_m: 15.0 }
+        Self { length_m: 2.6, least_gain: 0.02, blind_gain: 0.2, forget_after_m: 15.0 }
     }
 }
 
@@ -35,7 +35,7 @@ pub struct DistanceFilter {
 }
 
 impl DistanceFilter {
-    /// Takes in the distribution of one picture, seen after `distance_m` of travel, and returns the average.
+    /// Takes in the numbers of one picture, seen after `distance_m` of travel, and returns the average.
     pub fn update(&mut self, settings: &FilterSettings, p: &[f64], distance_m: Option<f64>) -> &[f64] {
         let step_m = distance_m.zip(self.last_m).map(|(now, then)| now - then);
         let jump = step_m.is_some_and(|s| !(0.0..=settings.forget_after_m).contains(&s));
@@ -92,11 +92,11 @@ mod tests {
         let after = |step_m: f64| {
             let mut filter = DistanceFilter::default();
             drive(&mut filter, &DRY, 0.0, 40.0, step_m);
-            drive(&mut filter, &ICE, 40.0, 44.0, step_m)[1]
+            drive(&mut filter, &ICE, 40.0, 40.0 + FilterSettings::default().length_m, step_m)[1]
         };
         // One filter length: 1 - 1/e.
         assert_relative_eq!(after(0.1), 1.0 - (-1.0f64).exp(), epsilon = 2e-3);
-        assert_relative_eq!(after(1.0), after(0.1), epsilon = 2e-3);
+        assert_relative_eq!(after(1.3), after(0.1), epsilon = 2e-3);
     }
 
     #[test]

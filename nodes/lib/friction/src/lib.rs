@@ -13,17 +13,24 @@
 //! doubt (no state out of the question, energy, a picture unlike those of its training); then p is averaged over the distance travelled. What fails
 //! a gate yields `valid = false`, its [`Reason`] and the uninformative prior: never zero, never the last value.
 //!
+//! The network has learned from renders. What a track's floors are worth is learned from pictures of them, [`Calibration`]; sigma is as wide as the
+//! errors on real roads until then.
+//!
 //! [`FrictionEstimator`] is the whole pipeline. Nothing here reads a clock or the environment: stamps, distances and folders
 //! come in as arguments.
 
+mod appearance;
 mod basis;
 mod bayer;
+mod calibration;
 mod decode;
 mod error;
 mod estimate;
 mod estimator;
 mod files;
 mod filter;
+mod learner;
+mod look;
 mod network;
 mod odometer;
 mod picture;
@@ -34,13 +41,19 @@ mod tensor;
 mod tract;
 mod transport;
 
+pub use appearance::{APPEARANCE, appearance};
 pub use basis::{Basis, FrictionClass, Prior};
+pub use calibration::{
+    Calibration, Errors, Example, Kernel, Known, NETWORK_ERROR, RoadFriction, road_friction,
+};
 pub use decode::decode;
 pub use error::FrictionError;
 pub use estimate::{Estimate, Reason, Source};
 pub use estimator::{FrictionEstimator, Motion};
 pub use files::{find_library, find_model};
 pub use filter::{DistanceFilter, FilterSettings};
+pub use learner::{Learner, Lesson};
+pub use look::Look;
 pub use network::{Answer, Network, OnnxRuntime};
 pub use odometer::Odometer;
 pub use picture::{Encoding, Frame, FrameData, RawPicture, Region, RgbPicture};

@@ -155,3 +155,19 @@ pub struct RgbPicture {
     /// `width * height * 3` bytes.
     pub data: Vec<u8>,
 }
+
+impl RgbPicture {
+    /// The part of the picture that lies in `region`.
+    #[must_use]
+    pub fn crop(self, region: &Region) -> Self {
+        let (x, y, w, h) = region.pixels(self.width, self.height);
+        if (w, h) == (self.width, self.height) {
+            return self;
+        }
+        let mut data = Vec::with_capacity((w * h * 3) as usize);
+        for row in self.data.chunks_exact(self.width as usize * 3).skip(y as usize).take(h as usize) {
+            data.extend_from_slice(&row[x as usize * 3..(x + w) as usize * 3]);
+        }
+        Self { width: w, height: h, data }
+    }
+}

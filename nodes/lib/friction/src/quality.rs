@@ -16,6 +16,9 @@ pub struct QualityStatistics {
     pub noise: f64,
     /// Mean step of luma between neighbouring blocks of 4 x 4 pixels: what a picture keeps unless it is badly blurred.
     pub structure: f64,
+    /// Mean step of luma over 8 pixels over that over 2, and over 16 over 4. Independent noise of the pixels gives a quarter, or a third after
+    /// a resize; whatever a lens has formed gives more.
+    pub coarseness: [f64; 2],
 }
 
 impl QualityStatistics {
@@ -40,6 +43,7 @@ impl QualityStatistics {
             saturated: share(|v| v > 250),
             noise: noise(&luma, width),
             structure: structure(&luma, width),
+            coarseness: coarseness(&luma, width),
         }
     }
 }
@@ -59,6 +63,48 @@ fn noise(luma: &[i32], width: usize) -> f64 {
         count += width as i64 - 2;
     }
     (std::f64::consts::PI / 2.0).sqrt() / 6.0 * sum as f64 / count.max(1) as f64
+}
+
+/// Mean absolute differences between neighbours, along rows and columns, of the picture and of the same halved in size four times.
+pub(crate) fn gradients(luma: &[f32], width: usize) -> [f64; 5] {
+    let (mut level, mut width) = (luma.to_vec(), width);
+    std::array::from_fn(|k| {
+        if k > 0 {
+            (level, width) = halve(&level, width);
+        }
+        if width < 2 || level.len() < 2 * width {
+            return 0.0;
+        }
+        let rows = level.len() / width;
+        let (mut along, mut across) = (0.0f64, 0.0f64);
+        for row in level.chunks_exact(width) {
+            along += f64::from(row.windows(2).map(|w| (w[1] - w[0]).abs()).sum::<f32>());
+        }
+        for (upper, lower) in level.chunks_exact(width).zip(level[width..].chunks_exact(width)) {
+            across += f64::from(upper.iter().zip(lower).map(|(a, b)| (b - a).abs()).sum::<f32>());
+        }
+        0.5 * (along / ((width - 1) * rows) as f64 + across / ((rows - 1) * width) as f64)
+    })
+}
+
+/// The means of 2 x 2 pixels.
+fn halve(level: &[f32], width: usize) -> (Vec<f32>, usize) {
+    let half = width / 2;
+    let mut out = Vec::with_capacity(level.len() / 4);
+    for rows in level.chunks_exact(2 * width.max(1)) {
+        let (upper, lower) = rows.split_at(width);
+        out.extend(
+            (0..half).map(|x| (upper[2 * x] + upper[2 * x + 1] + lower[2 * x] + lower[2 * x + 1]) / 4.0),
+        );
+    }
+    (out, half)
+}
+
+/// See [`QualityStatistics::coarseness`].
+fn coarseness(luma: &[i32], width: usize) -> [f64; 2] {
+    let luma: Vec<f32> = luma.iter().map(|v| *v as f32).collect();
+    let steps = gradients(&luma, width);
+    [(1, 3), (2, 4)].map(|(fine, coarse)| if steps[fine] > 0.0 { steps[coarse] / steps[fine] } else { 1.0 })
 }
 
 /// Mean absolute second difference of the means of 4 x 4 blocks, along rows and columns.
@@ -102,6 +148,8 @@ pub struct QualityLimits {
     pub most_noise: f64,
     /// Structure below which the picture is blurred or blank, levels.
     pub least_structure: f64,
+    /// Coarseness at and below which, both figures, the picture is nothing but noise of the sensor.
+    pub least_coarseness: [f64; 2],
 }
 
 impl Default for QualityLimits {
@@ -112,6 +160,7 @@ impl Default for QualityLimits {
             most_saturated: 0.6,
             most_noise: 20.0,
             least_structure: 0.25,
+            least_coarseness: [0.36, 0.33],
         }
     }
 }
@@ -124,13 +173,17 @@ impl QualityLimits {
             Some(Reason::Dark)
         } else if seen.saturated > self.most_saturated {
             Some(Reason::Saturated)
-        } else if seen.noise > self.most_noise {
+        } else if seen.noise > self.most_noise || self.is_flat_noise(seen) {
             Some(Reason::Noisy)
         } else if seen.structure < self.least_structure {
             Some(Reason::Blurred)
         } else {
             None
         }
+    }
+
+    fn is_flat_noise(&self, seen: &QualityStatistics) -> bool {
+        seen.noise > 0.5 && (0..2).all(|k| seen.coarseness[k] < self.least_coarseness[k])
     }
 }
 
@@ -178,7 +231,13 @@ mod tests {
         assert_eq!(reason(&grey(224, |_, _| 255.0)), Some(Reason::Saturated));
         assert_eq!(reason(&noisy(60.0)), Some(Reason::Noisy));
         assert_eq!(reason(&grey(224, |_, _| 120.0)), Some(Reason::Blurred));
-        assert_eq!(reason(&noisy(12.0)), None);
+        // Noise of the sensor and nothing else, however weak.
+        for sigma in [2.0, 5.0, 12.0] {
+            assert_eq!(reason(&noisy(sigma)), Some(Reason::Noisy));
+        }
+        let grain =
+            |x: u32, y: u32| f64::from((x / 9 * 37 + y / 9 * 61) % 17) + f64::from((x * 7 + y * 3) % 5);
+        assert_eq!(reason(&grey(224, |x, y| 100.0 + grain(x, y))), None);
         assert_eq!(reason(&grey(4, |_, _| 120.0)), Some(Reason::Dark));
     }
 }

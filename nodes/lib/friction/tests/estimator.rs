@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used)]
 
 use gripsight_friction::{
-    Answer, Basis, Estimate, Frame, FrameData, FrictionError, FrictionEstimator, Motion, Network, RawPicture,
-    Reason, Settings, Source,
+    Answer, Basis, Calibration, Estimate, Example, Frame, FrameData, FrictionError, FrictionEstimator,
+    Motion, NETWORK_ERROR, Network, RawPicture, Reason, Settings, Source,
 };
 
 /// Answers with fixed logits and a fixed distance.
@@ -61,7 +61,7 @@ fn a_good_picture_gives_the_networks_answer() {
     let got = at(&mut estimator(&WET), 0, raw(&textured(1)), None);
     assert!(got.valid(), "{got:?}");
     assert_eq!(got.source, Source::Camera);
-    assert!((got.mu - 0.6).abs() < 0.01 && (got.sigma - 0.1).abs() < 0.02, "{got:?}");
+    assert!((got.mu - 0.6).abs() < 0.01 && (got.sigma - NETWORK_ERROR).abs() < 0.01, "{got:?}");
     assert_eq!(got.pictures, 1);
 }
 
@@ -107,13 +107,52 @@ fn a_network_in_doubt_is_not_believed() {
 #[test]
 fn a_picture_unlike_the_training_pictures_is_not_believed_however_sure_the_network_is() {
     let says = |distance| at(&mut estimator_at(&WET, distance), 0, raw(&textured(1)), None);
-    for strange in [1.5, f32::NAN] {
+    for strange in [2.1, f32::NAN] {
         assert_refused(&says(Some(strange)), Reason::Unfamiliar);
     }
+    let doubted = says(Some(1.9));
+    assert!(doubted.valid() && doubted.sigma > 1.3 * NETWORK_ERROR, "{doubted:?}");
     for usual in [Some(1.0), None] {
         let got = says(usual);
         assert!(got.valid() && got.unfamiliarity == usual.map(f64::from), "{got:?}");
     }
+}
+
+/// A track whose only floor looks like `textured` and has a friction of 0.35.
+fn taught() -> Calibration {
+    let mut e = estimator(&WET);
+    let examples: Vec<Example> = (1..9)
+        .map(|seed| Example {
+            appearance: at(&mut e, i64::from(seed), raw(&textured(seed)), None).appearance.unwrap().to_vec(),
+            mu: 0.35,
+            sigma: 0.03,
+            source: "drive".into(),
+            part: seed,
+            network_mu: Some(0.6),
+        })
+        .collect();
+    Calibration::learn("track", &examples).unwrap()
+}
+
+#[test]
+fn what_the_track_has_taught_outweighs_the_network_and_its_doubts() {
+    for logits in [WET, [8.0; 5]] {
+        let mut e = estimator(&logits);
+        e.calibrate(Some(taught()));
+        let got = at(&mut e, 0, raw(&textured(42)), None);
+        assert!(got.valid() && !got.new_floor(), "{got:?}");
+        assert!((got.mu - 0.35).abs() < 0.05 && got.sigma < 0.15, "{got:?}");
+    }
+}
+
+#[test]
+fn a_floor_unlike_what_was_taught_is_new_and_the_network_s_again() {
+    let mut e = estimator(&WET);
+    e.calibrate(Some(taught()));
+    let bright: Vec<u8> = textured(3).iter().enumerate().map(|(i, v)| v / 2 + [120, 60, 0][i % 3]).collect();
+    let got = at(&mut e, 0, raw(&bright), None);
+    assert!(got.valid() && got.new_floor(), "{got:?}");
+    assert!((got.mu - 0.6).abs() < 0.01 && got.sigma >= 0.25, "{got:?}");
 }
 
 #[test]

@@ -4,10 +4,11 @@
 //! inside it. Colours have fixed [`Role`]s in every picture.
 //!
 //! [`identification_page`] shows the result of an identification, [`gap_page`] that of a diagnosis ([`gap_text`] says the same on a terminal),
-//! [`simulator_page`] that of one with the user's own simulator, [`withheld_page`] the score of the blind check. They are built of [`Chart`]s,
+//! [`simulator_page`] that of one with the user's own simulator, [`withheld_page`] the score of the blind check, [`calibration_page`] what a track has taught the camera. They are built of [`Chart`]s,
 //! bars and tables; nothing here computes what is not only for the eye.
 
 mod bars;
+mod calibration;
 mod chart;
 mod error;
 mod gap;
@@ -20,6 +21,7 @@ pub mod text;
 mod topics;
 mod withheld;
 
+pub use calibration::{CalibrationInput, CalibrationPicture, calibration_page};
 pub use chart::{Axis, Chart, Layer};
 pub use error::ReportError;
 pub use gap::{Before, GapInput, gap_page, gap_text};

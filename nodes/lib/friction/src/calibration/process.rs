@@ -1,0 +1,133 @@
+//! A Gaussian process over appearances: friction as a smooth function of what a road looks like.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use crate::error::FrictionError;
+
+/// What is expected of a road of which nothing is known, and its variance.
+const MEAN: f64 = 0.6;
+const MEAN_VARIANCE: f64 = 0.09;
+/// Variance of what the appearance tells.
+const AMPLITUDE: f64 = 0.09;
+
+/// The shape of the function.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Kernel {
+    /// Distance, root of the mean square over the scaled numbers, over which friction changes.
+    pub length: f64,
+    /// Variance of a part that is linear in the numbers.
+    pub linear: f64,
+    /// Standard deviation of a picture's friction around the function.
+    pub noise: f64,
+}
+
+/// Mean of the squared differences.
+pub(super) fn distance2(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / a.len().max(1) as f64
+}
+
+fn covariance(kernel: &Kernel, a: &[f64], b: &[f64]) -> f64 {
+    let product: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / a.len().max(1) as f64;
+    MEAN_VARIANCE
+        + AMPLITUDE * (-distance2(a, b) / (2.0 * kernel.length * kernel.length)).exp()
+        + kernel.linear * product
+}
+
+/// The process given examples.
+#[derive(Debug, Clone)]
+pub(super) struct Process {
+    kernel: Kernel,
+    inputs: Vec<Vec<f64>>,
+    factor: Cholesky<f64, Dyn>,
+    weights: DVector<f64>,
+}
+
+impl Process {
+    /// `sigmas`: standard deviations of the labels.
+    pub(super) fn new(
+        kernel: Kernel,
+        inputs: Vec<Vec<f64>>,
+        labels: &[f64],
+        sigmas: &[f64],
+    ) -> Result<Self, FrictionError> {
+        let n = inputs.len();
+        let matrix = DMatrix::from_fn(n, n, |i, j| {
+            let own = if i == j { kernel.noise * kernel.noise + sigmas[i] * sigmas[i] } else { 0.0 };
+            covariance(&kernel, &inputs[i], &inputs[j]) + own
+        });
+        let factor = Cholesky::new(matrix).ok_or_else(|| FrictionError::BadCalibration {
+            message: "the examples' numbers are not finite, or their labels' spreads are zero".into(),
+        })?;
+        let weights = factor.solve(&DVector::from_iterator(n, labels.iter().map(|mu| mu - MEAN)));
+        Ok(Self { kernel, inputs, factor, weights })
+    }
+
+    /// Mean and variance of a picture's friction.
+    pub(super) fn read(&self, x: &[f64]) -> (f64, f64) {
+        let near = DVector::from_iterator(
+            self.inputs.len(),
+            self.inputs.iter().map(|i| covariance(&self.kernel, x, i)),
+        );
+        let explained = near.dot(&self.factor.solve(&near));
+        let noise = self.kernel.noise * self.kernel.noise;
+        let variance = (covariance(&self.kernel, x, x) - explained).max(0.0) + noise;
+        (MEAN + near.dot(&self.weights), variance)
+    }
+
+    /// Error and variance of each example when its group is left out: by blocks of the inverse, without fitting anew.
+    pub(super) fn left_out(&self, groups: &[Vec<usize>]) -> Vec<(f64, f64)> {
+        let inverse = self.factor.inverse();
+        let mut out = vec![(0.0, f64::INFINITY); self.inputs.len()];
+        for group in groups {
+            let block = DMatrix::from_fn(group.len(), group.len(), |i, j| inverse[(group[i], group[j])]);
+            let weights = DVector::from_iterator(group.len(), group.iter().map(|i| self.weights[*i]));
+            let Some(block) = Cholesky::new(block) else { continue };
+            let (errors, variances) = (block.solve(&weights), block.inverse());
+            for (k, i) in group.iter().enumerate() {
+                out[*i] = (errors[k], variances[(k, k)]);
+            }
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    const KERNEL: Kernel = Kernel { length: 0.8, linear: 0.05, noise: 0.05 };
+
+    fn line() -> (Vec<Vec<f64>>, Vec<f64>) {
+        let inputs: Vec<Vec<f64>> = (0..12).map(|k| vec![f64::from(k) / 4.0, 0.0]).collect();
+        let labels = inputs.iter().map(|x| 0.3 + 0.2 * x[0]).collect();
+        (inputs, labels)
+    }
+
+    #[test]
+    fn leaving_out_by_blocks_is_fitting_without_them() {
+        let (inputs, labels) = line();
+        let sigmas = vec![0.02; 12];
+        let process = Process::new(KERNEL, inputs.clone(), &labels, &sigmas).unwrap();
+        let groups: Vec<Vec<usize>> = (0..4).map(|g| (3 * g..3 * g + 3).collect()).collect();
+        let got = process.left_out(&groups);
+        let rest = |v: &[f64]| [&v[..3], &v[6..]].concat();
+        let without = [&inputs[..3], &inputs[6..]].concat();
+        let smaller = Process::new(KERNEL, without, &rest(&labels), &rest(&sigmas)).unwrap();
+        for i in 3..6 {
+            let (mu, variance) = smaller.read(&inputs[i]);
+            assert_relative_eq!(got[i].0, labels[i] - mu, epsilon = 1e-9);
+            assert_relative_eq!(got[i].1, variance + 0.02 * 0.02, epsilon = 1e-9);
+        }
+    }
+
+    #[test]
+    fn it_follows_its_examples_and_knows_nothing_far_away() {
+        let (inputs, labels) = line();
+        let process = Process::new(KERNEL, inputs, &labels, &[0.02; 12]).unwrap();
+        let (near, far) = (process.read(&[1.1, 0.0]), process.read(&[1.1, 40.0]));
+        assert_relative_eq!(near.0, 0.52, epsilon = 0.03);
+        assert!(near.1.sqrt() < 0.08 && far.1.sqrt() > 0.25, "{near:?} {far:?}");
+    }
+}

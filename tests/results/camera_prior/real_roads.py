@@ -1,0 +1,90 @@
+"""The camera prior on photographs of real roads that nothing was trained on: the network alone, and after some labelled pictures.
+
+    real_roads.py PICTURES [--bin gripsight] [--draws N] > real_roads_runs.csv
+
+PICTURES holds the folders of real_roads.csv (file, state by eye, start of the SHA-256): google_bing_yahoo_flickr/250x250 of
+github.com/kagan94/road_image_datasets. They are web pictures without a licence: read here, trained on nowhere, not part of this project. Each is of
+another place, camera and season, which is harder than one track. A draw takes N pictures of each state at random (its seed), learns from them with
+`gripsight friction calibrate`, and reads all others with `gripsight friction --calibration`.
+"""
+
+import argparse
+import csv
+import hashlib
+import json
+import math
+import random
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+FRICTION = {"dry": 0.85, "wet": 0.60, "snow": 0.25}
+
+
+def readings(gripsight, files, more=()):
+    command = [gripsight, "friction", "--json", *more, *map(str, files)]
+    return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+
+def score(name, draw, states, read):
+    """Root mean square error and the rest, each state counted alike, over the pictures that are not refused."""
+    errors = {state: [] for state in FRICTION}
+    confident = within = usable = 0
+    for state, reading in zip(states, read, strict=True):
+        if not reading["valid"]:
+            continue
+        usable += 1
+        error = reading["mu_hat"] - FRICTION[state]
+        errors[state].append(error * error)
+        within += abs(error) < reading["sigma"]
+        confident += abs(error) > 0.3 and reading["sigma"] < 0.15
+    rmse = math.sqrt(sum(sum(e) / len(e) for e in errors.values()) / len(errors))
+    return [name, draw, len(read), usable, f"{rmse:.4f}", f"{confident / usable:.4f}", f"{within / usable:.4f}"]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("pictures", type=Path)
+    parser.add_argument("--bin", default="target/release/gripsight")
+    parser.add_argument("--draws", type=int, default=10)
+    parser.add_argument("--counts", type=int, nargs="*", default=[5, 10, 20])
+    args = parser.parse_args()
+    with open(Path(__file__).with_name("real_roads.csv"), newline="", encoding="utf-8") as table:
+        rows = list(csv.DictReader(table))
+    for row in rows:
+        digest = hashlib.sha256((args.pictures / row["file"]).read_bytes()).hexdigest()
+        if not digest.startswith(row["sha256"]):
+            sys.exit(f"{row['file']} is another picture than the one labelled")
+    out = csv.writer(sys.stdout, lineterminator="\n")
+    out.writerow(["read by", "draw", "pictures", "usable", "balanced rmse", "confidently wrong", "within sigma"])
+    files = [args.pictures / row["file"] for row in rows]
+    states = [row["state"] for row in rows]
+    middle = sum(FRICTION.values()) / len(FRICTION)
+    constant = [{"valid": True, "mu_hat": middle, "sigma": 0.25}] * len(rows)
+    out.writerow(score("constant", 0, states, constant))
+    out.writerow(score("network", 0, states, readings(args.bin, files)))
+    for count in args.counts:
+        for draw in range(args.draws):
+            rng = random.Random(1000 * count + draw)
+            taken = {i for s in FRICTION for i in rng.sample([i for i, x in enumerate(states) if x == s], count)}
+            with tempfile.TemporaryDirectory() as folder:
+                labels = []
+                for state, mu in FRICTION.items():
+                    own = Path(folder) / state
+                    own.mkdir()
+                    labels += ["--label", f"{state}={own}:{mu}"]
+                    for i in taken:
+                        if states[i] == state:
+                            (own / f"{i}{files[i].suffix}").symlink_to(files[i].resolve())
+                learned = f"{folder}/track.json"
+                command = [args.bin, "friction", "calibrate", *labels, "--out", learned]
+                subprocess.run(command, check=True, capture_output=True)
+                rest = [i for i in range(len(rows)) if i not in taken]
+                read = readings(args.bin, [files[i] for i in rest], ["--calibration", learned])
+                out.writerow(score(f"{count} a state", draw, [states[i] for i in rest], read))
+                sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()
