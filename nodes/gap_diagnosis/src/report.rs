@@ -16,7 +16,7 @@ pub(crate) fn write(
 ) -> anyhow::Result<PathBuf> {
     let place = folder.join(sequence_id.to_string());
     fs::create_dir_all(&place).with_context(|| format!("folder {}", place.display()))?;
-    let page = gap_page(&GapInput { diagnosis, header, earlier: None, topics: &[], data_notes: &[] })?;
+    let page = gap_page(&GapInput { diagnosis, header, before: None, topics: &[], data_notes: &[] })?;
     for (name, text) in [("gap.json", serde_json::to_string_pretty(diagnosis)?), ("report.html", page)] {
         let path = place.join(name);
         fs::write(&path, text).with_context(|| format!("file {}", path.display()))?;
