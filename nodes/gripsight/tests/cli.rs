@@ -291,7 +291,10 @@ fn hostile_inputs_are_named_in_one_line_each() {
     assert!(error.contains("/not/there"), "{error}");
     assert!(identify(&bag, &["--previous", &bad_yaml]).contains("bad.yaml"));
     assert!(identify(&bag, &["--sequence", "12"]).contains("no state sequence 12"));
-    assert!(identify(&bag, &["--camera"]).contains("no topic with pictures"));
+    // A prior that is not there ends nothing.
+    let without_prior = gripsight(&["identify", &bag, "--out", &out, "--camera"]);
+    assert_eq!(code(&without_prior), code(&gripsight(&["identify", &bag, "--out", &out])));
+    assert!(stderr(&without_prior).contains("no friction prior"), "{}", stderr(&without_prior));
     let not_a_folder = write("file", b"");
     let error = error_of(&["identify", &bag, "--out", &format!("{not_a_folder}/x")]);
     assert!(error.contains("cannot make"), "{error}");

@@ -16,7 +16,7 @@ use crate::decisions;
 use crate::engine::Engine;
 
 use crate::answer::Change;
-use crate::infer::Inferred;
+use crate::infer::{FIRST, Inferred};
 use crate::outcome::EffectParameter;
 use crate::trust::TireTrust;
 
@@ -144,6 +144,24 @@ impl Compared {
     pub(crate) fn of_site(&self, earlier: &Inferred, site: Site) -> f64 {
         let terms = earlier.terms_of_site(site);
         self.selection.probability_that(|c| c[self.terms..][terms.clone()].iter().any(|&a| a > 0))
+    }
+
+    /// The later drive's most probable model: its values within what is believed of each effect, and the terms that it has.
+    pub(crate) fn later(&self, engine: &Engine<'_>, earlier: &Inferred) -> (Vec<f64>, Vec<usize>) {
+        let n = self.columns;
+        let step = &self.selection.best_step;
+        let mut values: Vec<f64> = (0..n).map(|i| earlier.values[i] + step[i] + step[n + i]).collect();
+        for effect in &earlier.columns.effects {
+            let columns = earlier.columns.of_effect(*effect).unwrap_or(0..0);
+            for (column, spec) in columns.zip(effect.spec().parameters) {
+                let [low, high] = spec.range.map(|r| spec.null + r * engine.size(spec));
+                values[column] = values[column].clamp(low, high);
+            }
+        }
+        let best = &self.selection.best;
+        // Tires and hold have no alternatives of their own.
+        let has = |t: usize| t >= FIRST && (best[t] > 0 || best[self.terms + t] > 0);
+        (values, (0..self.terms).map(|t| usize::from(has(t))).collect())
     }
 
     /// Parameters of an effect in the earlier drive.

@@ -72,6 +72,8 @@ const GENERIC: [[f64; 8]; 3] = [
 ];
 /// Windows that the inference works on, at most.
 const SEARCH_WINDOWS: usize = 70;
+/// How often a later drive is linearised to be compared with an earlier one.
+const COMPARISONS: usize = 2;
 /// Iterations of the fits on all training blocks.
 const FINAL_ITERATIONS: usize = 15;
 
@@ -131,9 +133,19 @@ pub(crate) fn explain(
             let like = &earlier.inferred;
             let mut alike = Engine::new(&recording, request.vehicle, like.tires, TireTrust::file());
             let null = fitted_null(&alike, &search_windows)?;
-            let later = linearised(&mut alike, &null, like, &search_windows).ok_or(GapError::NotFinite)?;
-            engine.sigma = alike.sigma.clone();
-            let differences = earlier.compared(&alike, &later).ok_or(GapError::NotFinite)?;
+            let (mut values, mut chosen) = (like.values.clone(), like.chosen.clone());
+            let mut compared = None;
+            // The first time around the earlier drive's model, then around what the comparison makes of the later one.
+            for _ in 0..COMPARISONS {
+                let at = (&values[..], &chosen[..]);
+                let later =
+                    linearised(&mut alike, &null, like, at, &search_windows).ok_or(GapError::NotFinite)?;
+                let differences = earlier.compared(&alike, &later).ok_or(GapError::NotFinite)?;
+                (values, chosen) = differences.later(&alike, earlier);
+                compared = Some((later, differences));
+            }
+            let (later, differences) = compared.ok_or(GapError::NotFinite)?;
+            engine.sigma.clone_from(&alike.sigma);
             (later, Some((earlier, differences)))
         }
     };

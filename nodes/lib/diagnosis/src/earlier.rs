@@ -82,6 +82,11 @@ pub(crate) struct Differences {
 }
 
 impl Differences {
+    /// The later drive's most probable model: its values, and the terms that it has.
+    pub(crate) fn later(&self, engine: &Engine<'_>, earlier: &Earlier) -> (Vec<f64>, Vec<usize>) {
+        self.compared.later(engine, &earlier.inferred)
+    }
+
     /// An effect's parameters in the later drive, with the standard deviations of the differences.
     pub(crate) fn size(&self, earlier: &Earlier, effect: EffectId) -> Sized {
         let before = self.compared.earlier(&earlier.inferred, effect).unwrap_or_default();

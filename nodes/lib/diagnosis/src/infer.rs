@@ -181,17 +181,19 @@ pub(crate) fn infer(
     }
 }
 
-/// Linearises another drive in the same columns, around its own best model of the same configuration. The engine's channel weights become those
-/// of the noise found.
+/// Linearises another drive in the same columns, around the best fit to it of a configuration, from given values on. The engine's channel weights
+/// become those of the noise found.
 pub(crate) fn linearised(
     engine: &mut Engine<'_>,
     null: &State,
     like: &Inferred,
+    (from, chosen): (&[f64], &[usize]),
     windows: &Windows,
 ) -> Option<Inferred> {
     let columns = like.columns.clone();
-    let mut values = like.values.clone();
+    let mut values = from.to_vec();
     let mut starts = engine.starts_of(null, windows);
+    engine.sigma.clone_from(&engine.recording.weights);
     let base = engine.sigma.clone();
     let library: Vec<EffectId> = columns.effects.iter().copied().filter(|e| like.is_open(*e)).collect();
     for round in 1.. {
@@ -203,7 +205,7 @@ pub(crate) fn linearised(
         let weighed = joint.weighed(&scale);
         let dispersion = repeated(&weighed, &terms, &open)?;
         if round == NOISE_ROUNDS {
-            let selection = select(&weighed.total, dispersion, &terms, &like.selection.best, 17)?;
+            let selection = select(&weighed.total, dispersion, &terms, chosen, 17)?;
             let confirmed = selection
                 .probability
                 .iter()
@@ -236,7 +238,7 @@ pub(crate) fn linearised(
             joint: &joint,
             scale: &scale,
         };
-        let (_, fitted) = around.by_rollouts(&weighed.total, &like.selection.best)?;
+        let (_, fitted) = around.by_rollouts(&weighed.total, chosen)?;
         (values, starts) = (fitted.values, fitted.starts);
     }
     None
