@@ -53,7 +53,10 @@ pub(crate) fn decide(budget: &Budget, inferred: &Inferred, library: &[EffectId])
             statement.over_unexplained.min(99.0)
         ));
     }
-    let verdict = if !lacking.is_empty() {
+    // Something is there that has no name: what does nearly the same is not among the candidates.
+    let unnamed =
+        |e: &EffectId| inferred.statement(*e).is_some() && inferred.probability_here(*e) >= decisions::NAMED;
+    let verdict = if !lacking.is_empty() || inferred.candidates().iter().any(unnamed) {
         Verdict::NoneOfThese
     } else if mean(&budget.nominal) - budget.retuned() > RETUNE_EXCESS {
         Verdict::TireRetuneOnly
