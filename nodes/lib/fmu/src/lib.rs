@@ -1,6 +1,6 @@
 //! The car model as a unit for co-simulation: what others' simulators load (Functional Mock-up Interface 3.0, and 2.0).
 //!
-//! The crate is built twice. As a library it makes the unit's file ([`write`]): a zip archive of `modelDescription.xml`, the car
+//! The crate is built twice. As a library it makes the unit's file ([`write()`]): a zip archive of `modelDescription.xml`, the car
 //! (`resources/car.json`, a [`gripsight_model::CarFile`]) and the shared object. As that shared object it is the unit: [`Unit`] behind the interface's C functions.
 //!
 //! The unit is [`gripsight_model::Drive`], so it moves as the model does that a diagnosis rolls out. Its inputs hold over a step, unless their
