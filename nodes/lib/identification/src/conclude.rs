@@ -7,7 +7,7 @@ use gripsight_vehicle::{
 };
 
 use crate::data::Part;
-use crate::direct::{PeakEvidence, axle_sigma, standard_error};
+use crate::direct::{PeakEvidence, axle_sigma};
 use crate::envelope::Envelope;
 use crate::judge::{best_starts, errors_over_horizon, one_step_errors, rollout_errors};
 use crate::picture::{curves, trace};
@@ -219,7 +219,7 @@ fn around(value: f64, direct: f64, error: Option<f64>, shift: f64) -> Estimate {
 fn stiffness(run: &Identification, tires: &PacejkaParameters) -> PerAxle<Estimate> {
     let axle = |axle: &MagicFormula, direct: &MagicFormula, offset: usize, load_n: f64| {
         let (k, d) = (axle.normalized_stiffness(), direct.normalized_stiffness());
-        let e = around(k, d, standard_error(&run.direct.fit, offset), run.direct.shift[offset]);
+        let e = around(k, d, run.direct.standard_error(offset), run.direct.shift[offset]);
         Estimate { value: e.value * load_n, low: e.low.max(0.0) * load_n, high: e.high * load_n }
     };
     PerAxle {

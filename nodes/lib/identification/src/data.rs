@@ -4,7 +4,7 @@ use gripsight_model::{Window, tile};
 use gripsight_signals::{DataHealth, Segment, segments};
 use gripsight_vehicle::VehicleParameters;
 
-use crate::{IdentificationError, Usable};
+use crate::{Doubt, IdentificationError, Usable};
 
 /// What a window is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,6 +32,8 @@ pub(crate) struct Data {
     pub(crate) a_x_mps2: Vec<Vec<f64>>,
     /// Noise of v_y and yaw rate, from what neither car nor tire does that fast.
     pub(crate) noise: [f64; 2],
+    /// How far the signals may be off by what nothing checks.
+    pub(crate) doubt: Doubt,
 }
 
 /// Length of a window: several time constants of any car's lateral motion at speed.
@@ -103,6 +105,7 @@ impl Data {
             mean_speed_mps: f64::NAN,
             a_x_mps2,
             noise,
+            doubt: usable.recorded.doubt,
         };
         data.share_out(&windows, usize::MAX);
         Ok(data)

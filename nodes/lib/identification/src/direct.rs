@@ -11,6 +11,7 @@
 //! Which is identifiable from what: the yaw rate's bias from the heading alone (fixed then); delay from transients; offset and bias of v_y from driving
 //! straight; gain (against K_f) and lever arm (against K_r) from a range of speeds, and from nothing else. Every one has a prior.
 
+mod errors;
 mod peak;
 mod prior;
 mod signals;
@@ -23,7 +24,8 @@ use nalgebra::DMatrix;
 use crate::data::{Data, Part, quantile};
 use crate::extract::extract;
 use crate::rollout::{
-    NAMES, Nuisance, PARAMETERS, SIGNALS, TireRollout, corrections_of, nuisance_of, tires_of,
+    NAMES, Nuisance, PARAMETERS, SIGNALS, SLIP_SHARE, TireRollout, V_X_SCALE, YAW_RATE_SCALE, corrections_of,
+    nuisance_of, tires_of,
 };
 use crate::sweep::Point;
 use crate::tires::{C_PRIOR, E_PRIOR, parameters};
@@ -53,8 +55,10 @@ const LOW_WINDOWS: usize = 12;
 pub(crate) struct Direct {
     pub(crate) tires: PacejkaParameters,
     pub(crate) corrections: SignalCorrections,
-    /// The last fit, for intervals.
+    /// The last fit.
     pub(crate) fit: Fit,
+    /// Covariance of its parameters; `None` where nothing is known.
+    covariance: Option<DMatrix<f64>>,
     /// What the fit allowed for beside the tires.
     pub(crate) allowed: Nuisance,
     /// The same as rollouts with [`Self::tires`] need it: what combined slip takes is in the tires already.
@@ -125,11 +129,15 @@ pub(crate) fn direct(
         return Err(IdentificationError::NotFinite { what: "direct fit" });
     }
     // Gain and lever arm that were left at their nominal values may still be off by their priors: their uncertainty is everyone's.
+    // So are the scales that nothing tells.
     // So is that of a correction on a bound: it is not known, only kept from going further.
     let mut open = all.clone();
     restart(&mut open, &found.parameters);
-    for j in [GAIN, LEVER] {
+    for j in [GAIN, LEVER, V_X_SCALE, YAW_RATE_SCALE, SLIP_SHARE] {
         open[j].free = true;
+    }
+    if let Some(prior) = open[GAIN].prior.as_mut().filter(|_| !all[GAIN].free) {
+        prior.sigma = prior.sigma.max(data.doubt.steering_gain / SPREAD);
     }
     for j in [0, 4].into_iter().chain(SIGNALS..PARAMETERS) {
         let parameter = &mut open[j];
@@ -137,6 +145,7 @@ pub(crate) fn direct(
         (parameter.low, parameter.high) = (parameter.low - width, parameter.high + width);
     }
     let errors = fitter.solve(&open, &fitter.training, &weights.sigma, 0);
+    let covariance = errors::covariance(&errors, &open, &data.doubt);
     let allowed = nuisance_of(&found.parameters);
     let fitted = tires_of(&found.parameters);
     Ok(Direct {
@@ -148,7 +157,7 @@ pub(crate) fn direct(
         nuisance: Nuisance { combined_slip: 0.0, ..allowed },
         allowed,
         shift,
-        signal_errors: std::array::from_fn(|j| match standard_error(&errors, SIGNALS + j) {
+        signal_errors: std::array::from_fn(|j| match standard_error(covariance.as_ref(), SIGNALS + j) {
             // The yaw rate's bias was known from the heading.
             None if j == 5 => Some(signal_priors[5].sigma),
             error => error,
@@ -161,6 +170,7 @@ pub(crate) fn direct(
             .map(|j| (NAMES[j], found.parameters[j]))
             .collect(),
         fit: errors,
+        covariance,
         scatter: weights.scatter,
         slips,
         peak,
@@ -172,13 +182,24 @@ pub(crate) fn direct(
 const SPREAD: f64 = 1.6;
 
 /// Covariance of some parameters; `None` where nothing is known of them.
-pub(crate) fn covariance_of(fit: &Fit, parameters: &[usize]) -> Option<DMatrix<f64>> {
+fn covariance_of(fit: &Fit, parameters: &[usize]) -> Option<DMatrix<f64>> {
     fit.posterior_of(parameters).map(|c| c * SPREAD.powi(2))
 }
 
-/// Standard error of a parameter; `None` where it was not free or nothing is known of it.
-pub(crate) fn standard_error(fit: &Fit, parameter: usize) -> Option<f64> {
-    covariance_of(fit, &[parameter]).map(|c| c[(0, 0)].max(0.0).sqrt()).filter(|&e| e > 0.0)
+fn standard_error(covariance: Option<&DMatrix<f64>>, parameter: usize) -> Option<f64> {
+    covariance.map(|c| c[(parameter, parameter)].max(0.0).sqrt()).filter(|&e| e > 0.0)
+}
+
+impl Direct {
+    /// Standard error of a parameter; `None` where it was not free or nothing is known of it.
+    pub(crate) fn standard_error(&self, parameter: usize) -> Option<f64> {
+        standard_error(self.covariance.as_ref(), parameter)
+    }
+
+    /// Covariance of an axle's (k, C, D, E); `None` where nothing is known.
+    pub(crate) fn covariance_of_axle(&self, offset: usize) -> Option<DMatrix<f64>> {
+        self.covariance.as_ref().map(|c| c.view((offset, offset), (4, 4)).into_owned())
+    }
 }
 
 /// The nearest Magic Formula is fitted to about this many points.

@@ -43,7 +43,7 @@ pub use outcome::{
     Change, HorizonError, IterationRecord, Outcome, PeakFriction, ProvisionalSet, Rmse, RmseReport,
     SignalEstimates, Source, Status, TireCurve, Trace, WeakSignal,
 };
-pub use recorded::{EstimatedChannel, EstimatedMotion, Objection, Recorded, Usable, Why};
+pub use recorded::{Doubt, EstimatedChannel, EstimatedMotion, Objection, Recorded, Usable, Why};
 pub use residual::train_residual;
 pub use residual_model::{INPUTS, OUTPUTS, ResidualModel};
 pub use rollout::Nuisance;

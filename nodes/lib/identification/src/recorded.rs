@@ -7,17 +7,23 @@
 //!
 //! A pure function of the sequence and the car, so that live and offline agree.
 
+mod doubt;
+mod estimate;
+
 use std::fmt;
 
 use gripsight_signals::{
     BadSpan, Check, Checks, Finding, Pair, StateSequence, cross_check, is_dead_reckoning,
     is_integral_of_twist, masked, stands_still, steering_check,
 };
-use gripsight_state_estimation::{Motion, Smoothed, smooth};
+use gripsight_state_estimation::smooth;
 use gripsight_vehicle::VehicleParameters;
 use serde::Serialize;
 
 use crate::{Estimate, IdentificationError};
+
+pub use doubt::Doubt;
+use estimate::{fill, sharper, source};
 
 /// Why a channel was estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -57,8 +63,10 @@ pub struct EstimatedMotion {
     pub v_x_scale: Estimate,
     /// Times at which the localisation jumped, since the start of the sequence, s.
     pub jumps_s: Vec<f64>,
-    /// Observations that contradicted the rest, and were left out.
+    /// Observations that contradicted the rest, and hardly count.
     pub left_out: usize,
+    /// Samples left out since their v_y is known far worse than that of the others.
+    pub unknown_samples: usize,
 }
 
 /// Why nothing is fitted.
@@ -117,6 +125,8 @@ pub struct Recorded {
     pub bad_samples: Vec<BadSpan>,
     /// What was estimated of the motion.
     pub estimated: Option<EstimatedMotion>,
+    /// How far what is fitted may be off by what the checks leave open.
+    pub doubt: Doubt,
     /// Why nothing is fitted; empty where something is.
     pub objections: Vec<Objection>,
 }
@@ -132,8 +142,6 @@ pub struct Usable {
 
 /// An accelerometer on a body that rolls, or is mounted askew, may read this much more than the motion takes; beyond it v_x or yaw rate is in doubt.
 const ROLL: f64 = 0.08;
-/// An accelerometer off by more than this is not used to estimate v_y.
-const USELESS: f64 = 0.15;
 
 impl Usable {
     /// Looks at a sequence of a car.
@@ -163,6 +171,10 @@ impl Usable {
         let clean = masked(sequence)?;
         let mut checks = cross_check(&clean.sequence)?;
         checks.checks.extend(steering_check(&clean.sequence, vehicle.wheelbase_m())?);
+        if let Some(check) = sharper(&clean.sequence, &checks) {
+            checks.checks.retain(|c| c.pair != check.pair);
+            checks.checks.push(check);
+        }
         let mut judge = Judge { sequence: &clean.sequence, checks: &checks, objections: Vec::new() };
         let mut wanted = judge.wanted();
         let mut objections = judge.objections;
@@ -182,6 +194,8 @@ impl Usable {
                 Err(_) => objections.push(Objection::PoorPoses),
             }
         }
+        let estimated = usable.recorded.estimated.as_ref().map_or(&[][..], |e| &e.channels);
+        usable.recorded.doubt = Doubt::of(&checks, estimated);
         usable.recorded.checks = checks;
         usable.recorded.objections = objections;
         Ok(usable)
@@ -316,62 +330,6 @@ impl Judge<'_> {
             }
             _ => self.object(check),
         }
-    }
-}
-
-/// What the estimate is made of: everything but what is in doubt.
-fn source(sequence: &StateSequence, checks: &Checks, wanted: &[(&'static str, Why)]) -> StateSequence {
-    let mut source = sequence.clone();
-    source.v_y_mps.fill(0.0);
-    // The estimate goes by the gyroscope where there is one, with a scale of its own: it must not be in another unit or turned; and where it
-    // disagrees with a yaw rate that nothing speaks against, it is the gyroscope that is wrong.
-    let yaw_rate_wrong = wanted.iter().any(|(channel, _)| *channel == "yaw_rate_radps");
-    let gyro = checks.of(Pair::YawRateAndGyro).map(|c| c.finding);
-    if gyro.is_some_and(|f| {
-        matches!(f, Finding::Unit { .. } | Finding::Sign) || f.disagrees() && !yaw_rate_wrong
-    }) {
-        source.gyro_yaw_rate_radps.clear();
-    }
-    let useless = |pair| {
-        checks.of(pair).is_some_and(|c: &Check| c.finding.disagrees() && (c.ratio - 1.0).abs() > USELESS)
-    };
-    if useless(Pair::LateralAccelerationAndMotion) || useless(Pair::ForwardAccelerationAndMotion) {
-        source.a_x_mps2.clear();
-        source.a_y_mps2.clear();
-    }
-    source
-}
-
-/// Puts the estimate in the place of what was wanted.
-fn fill(
-    sequence: &mut StateSequence,
-    smoothed: &Smoothed,
-    wanted: &[(&'static str, Why)],
-) -> EstimatedMotion {
-    let mut channels = Vec::new();
-    for &(channel, why) in wanted {
-        let place = ["v_x_mps", "v_y_mps", "yaw_rate_radps"].iter().position(|c| *c == channel).unwrap_or(1);
-        let value = |m: &Motion| [m.v_x_mps, m.v_y_mps, m.yaw_rate_radps][place];
-        let column: Vec<f32> = smoothed.motion.iter().map(|m| value(m) as f32).collect();
-        let n = smoothed.motion.len().max(1) as f64;
-        let sigma =
-            (smoothed.motion.iter().map(|m| m.covariance[place][place].max(0.0)).sum::<f64>() / n).sqrt();
-        match place {
-            0 => sequence.v_x_mps = column,
-            2 => sequence.yaw_rate_radps = column,
-            _ => sequence.v_y_mps = column,
-        }
-        channels.push(EstimatedChannel { channel, why, sigma });
-    }
-    let (scale, sigma) = smoothed.v_x_scale;
-    EstimatedMotion {
-        channels,
-        pose_delay_s: smoothed
-            .pose_delay_s
-            .map(|(delay_s, sigma_s)| Estimate::from_error(delay_s, Some(sigma_s))),
-        v_x_scale: Estimate::from_error(1.0 + scale, Some(sigma)),
-        jumps_s: smoothed.jumps_s.clone(),
-        left_out: smoothed.left_out,
     }
 }
 

@@ -14,6 +14,9 @@
 //!
 //! Relaxation length, k and the share of m a_x h/L that really is shifted (springs, and tires that gain less grip than load) are nuisances of the
 //! estimation, not results: Phi_p goes to models that have none of them.
+//!
+//! The scales of v_x and yaw rate and the share of the sideslip that v_y shows are held at one while tires are fitted, and opened when it is asked how well
+//! those are known: hardly any drive tells a scale from the tires, so that what nothing checks of a signal is in the intervals.
 
 mod vector;
 
@@ -25,8 +28,8 @@ use crate::data::Data;
 
 pub use vector::Nuisance;
 pub(crate) use vector::{
-    COMBINED, NAMES, PARAMETERS, RELAXATION, SIGNALS, TRANSFER, corrections_of, nuisance_of, tires_of,
-    vector_of,
+    COMBINED, NAMES, PARAMETERS, RELAXATION, SIGNALS, SLIP_SHARE, TRANSFER, V_X_SCALE, YAW_RATE_SCALE,
+    corrections_of, nuisance_of, tires_of, vector_of,
 };
 
 /// Predicts what the sensors report of v_y and yaw rate.
@@ -41,7 +44,7 @@ pub(crate) struct TireRollout<'a> {
 /// Input and load transfer at a sample.
 #[derive(Debug, Clone, Copy)]
 struct Drive<T> {
-    v_x_mps: f64,
+    v_x_mps: T,
     steering_rad: T,
     /// Share of the front and of the rear static load that is on the axle.
     load: [T; 2],
@@ -110,6 +113,7 @@ impl<'a> TireRollout<'a> {
         let delay_samples = p[SIGNALS] / segment.dt_s;
         let (front_n, rear_n) = (self.vehicle.static_load_front_n(), self.vehicle.static_load_rear_n());
         let transfer_kg = self.vehicle.mass_kg * self.vehicle.h_cg_m / self.vehicle.wheelbase_m();
+        let faster = p[V_X_SCALE].recip();
         let least = |load: T| if load.re() < LEAST_LOAD { T::from(LEAST_LOAD) } else { load };
         let drive = |k: usize| {
             let shifted_n = p[TRANSFER] * (transfer_kg * self.a_x_mps2[window.segment][k]);
@@ -129,7 +133,7 @@ impl<'a> TireRollout<'a> {
                 load[0].recip() * front_pull_n * (1.0 / front_n),
                 load[1].recip() * force_n * ((1.0 - front) / rear_n),
             ];
-            Drive { v_x_mps: segment.v_x_mps[k], steering_rad, load, pull, front_pull_n }
+            Drive { v_x_mps: faster * segment.v_x_mps[k], steering_rad, load, pull, front_pull_n }
         };
         let end = window.from + window.len;
         let slowest = segment.v_x_mps[window.from..end].iter().copied().fold(f64::INFINITY, f64::min);
@@ -189,7 +193,7 @@ impl<'a> TireRollout<'a> {
         let (front_n, rear_n) = (across_n * cos + along_n * sin, rear.re() * loads_n[1]);
         let drag_m = v.h_cg_m * front.re();
         // The same line for v_y and yaw rate: what a newton at the front and one at the rear do, and what the front wheels' drag does.
-        let rate = |value: f64, by_front: f64, by_drag: f64, by_rear: f64, by_yaw_rate: f64| {
+        let rate = |value: f64, by_front: f64, by_drag: f64, by_rear: f64, by_turning: [f64; 2]| {
             let slope = by_front * cos - by_drag * drag_m * sin;
             let turned = by_front * (along_n * cos - across_n * sin) - by_drag * drag_m * across_n * cos;
             T::chain(
@@ -201,25 +205,27 @@ impl<'a> TireRollout<'a> {
                     (by_front * sin, &drive.front_pull_n),
                     (by_rear * loads_n[1], &rear),
                     (by_rear * rear.re() * static_n[1], &drive.load[1]),
-                    (by_yaw_rate, &x.yaw_rate_radps),
+                    (by_turning[0], &x.yaw_rate_radps),
+                    (by_turning[1], &drive.v_x_mps),
                 ],
             )
         };
         let (mass_kg, inertia_kgm2) = (v.mass_kg, v.yaw_inertia_kgm2);
+        let (v_x_mps, yaw_rate_radps) = (drive.v_x_mps.re(), x.yaw_rate_radps.re());
         State {
             v_y_mps: rate(
-                (rear_n + front_n) / mass_kg - drive.v_x_mps * x.yaw_rate_radps.re(),
+                (rear_n + front_n) / mass_kg - v_x_mps * yaw_rate_radps,
                 1.0 / mass_kg,
                 0.0,
                 1.0 / mass_kg,
-                -drive.v_x_mps,
+                [-v_x_mps, -yaw_rate_radps],
             ),
             yaw_rate_radps: rate(
                 (front_n * v.l_f_m - across_n * drag_m * sin - rear_n * v.l_r_m) / inertia_kgm2,
                 v.l_f_m / inertia_kgm2,
                 1.0 / inertia_kgm2,
                 -v.l_r_m / inertia_kgm2,
-                0.0,
+                [0.0; 2],
             ),
         }
     }
@@ -227,12 +233,12 @@ impl<'a> TireRollout<'a> {
 
 impl<T: Real> Drive<T> {
     fn input(&self) -> Input<T> {
-        Input { v_x_mps: T::from(self.v_x_mps), steering_rad: self.steering_rad }
+        Input { v_x_mps: self.v_x_mps, steering_rad: self.steering_rad }
     }
 
     fn towards(&self, next: &Self, share: f64) -> Self {
         Self {
-            v_x_mps: self.v_x_mps + (next.v_x_mps - self.v_x_mps) * share,
+            v_x_mps: between(&self.v_x_mps, &next.v_x_mps, T::from(share)),
             steering_rad: between(&self.steering_rad, &next.steering_rad, T::from(share)),
             load: std::array::from_fn(|i| self.load[i] + (next.load[i] - self.load[i]) * share),
             pull: std::array::from_fn(|i| self.pull[i] + (next.pull[i] - self.pull[i]) * share),
@@ -282,9 +288,12 @@ impl Rollout for TireRollout<'_> {
     fn rollout<T: Real>(&self, p: &[T], start: [T; 2], window: &Window, out: &mut Vec<T>) {
         out.clear();
         let [lever, v_y_bias, yaw_rate_bias] = [p[SIGNALS + 3], p[SIGNALS + 4], p[SIGNALS + 5]];
+        let (slip_share, scale) = (p[SLIP_SHARE], p[YAW_RATE_SCALE]);
+        // Sideslip is what the rear axle does beside rolling.
+        let arm = (-slip_share + 1.0) * self.vehicle.l_r_m + lever;
         self.trajectory(p, start, window, |at| {
-            out.push(at.state.v_y_mps + lever * at.state.yaw_rate_radps + v_y_bias);
-            out.push(at.state.yaw_rate_radps + yaw_rate_bias);
+            out.push(slip_share * at.state.v_y_mps + arm * at.state.yaw_rate_radps + v_y_bias);
+            out.push(scale * at.state.yaw_rate_radps + yaw_rate_bias);
         });
     }
 

@@ -26,7 +26,7 @@ mod window;
 
 pub use align::{AlignConfig, Aligner, Pushed};
 pub use channels::{CHANNELS, Channel, Clock, Kind};
-pub use checks::{Check, Checks, Finding, Pair, Unchecked, cross_check, steering_check};
+pub use checks::{Check, Checks, Finding, Pair, Unchecked, cross_check, lateral_speed_check, steering_check};
 pub use error::SignalError;
 pub use excitation::Excitation;
 pub use health::{DataHealth, FrozenSpan, Gap, stands_still};

@@ -45,6 +45,8 @@ const GATE_POSE: f64 = 16.27;
 const GATE_ONE: f64 = 10.83;
 /// So many poses in a row that contradict are a jump of the localisation.
 const JUMP_POSES: usize = 4;
+/// Place, heading, speeds, yaw rate and accelerations: the states before the constants.
+const MOTION: usize = 9;
 
 /// The filter, live.
 #[derive(Debug, Clone)]
@@ -54,7 +56,12 @@ pub struct Filter {
     time_s: Option<f64>,
     pub(crate) s: Vector,
     pub(crate) p: Matrix,
+    spread: Vector,
     contradicting: usize,
+    /// Poses since the last jump that did not contradict.
+    agreeing: usize,
+    /// How many of the first states began anew with the last observation that did so.
+    pub(crate) anew: usize,
     /// Times at which the localisation jumped.
     pub(crate) jumps_s: Vec<f64>,
     /// Observations left out.
@@ -95,7 +102,10 @@ impl Filter {
             time_s: None,
             s: Vector::zeros(),
             p: Matrix::from_diagonal(&spread),
+            spread,
             contradicting: 0,
+            agreeing: 0,
+            anew: 0,
             jumps_s: Vec::new(),
             left_out: 0,
         }
@@ -178,14 +188,15 @@ impl Filter {
     /// Takes one number by the row `h`.
     fn one(&mut self, innovation: f64, h: &Vector, sigma: f64) {
         let ph = self.p * h;
-        let variance = h.dot(&ph) + sigma * sigma;
+        let mut variance = h.dot(&ph) + sigma * sigma;
         if innovation * innovation > GATE_ONE * variance {
             self.left_out += 1;
-            // What goes on contradicting is true: the more, the less is known of the motion's change.
+            // What goes on contradicting is true: the more, the less is known of the motion's change; and it counts a little, the less the farther off
+            // it is, so that the filter finds back from wherever it was led.
             for place in [A_X, A_Y, ALPHA] {
                 self.p[(place, place)] *= 1.5;
             }
-            return;
+            variance = innovation * innovation / GATE_ONE;
         }
         let gain = ph / variance;
         self.s += gain * innovation;
@@ -227,15 +238,34 @@ impl Filter {
             return;
         }
         self.contradicting = 0;
+        self.agreeing += 1;
         let gain = columns * inverse;
         self.s += gain * innovation;
         self.p -= gain * columns.transpose();
         self.p = (self.p + self.p.transpose()) * 0.5;
     }
 
-    /// The localisation has jumped: place and heading are what it says now, and the motion is what it was.
+    /// The localisation has jumped: place and heading are what it says now, and the motion is what it was. Where it jumps again and again it is the motion
+    /// that is not known any more.
     fn begin_anew(&mut self, x_m: f64, y_m: f64, yaw_rad: f64) {
         self.contradicting = 0;
+        self.anew = 3;
+        if self.agreeing < JUMP_POSES && !self.jumps_s.is_empty() {
+            self.anew = MOTION;
+            for place in 3..MOTION {
+                for other in 0..N {
+                    self.p[(place, other)] = 0.0;
+                    self.p[(other, place)] = 0.0;
+                }
+                self.p[(place, place)] = self.spread[place];
+            }
+            // The speed along is known best.
+            self.p[(V_X, V_X)] = self.spread[V_Y];
+            for place in [V_Y, A_X, A_Y, ALPHA] {
+                self.s[place] = 0.0;
+            }
+        }
+        self.agreeing = 0;
         self.jumps_s.extend(self.time_s);
         let values = [x_m, y_m, yaw_rad];
         let sigmas = [self.levels.position_m, self.levels.position_m, self.levels.heading_rad];

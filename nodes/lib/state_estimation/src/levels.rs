@@ -2,6 +2,7 @@
 
 use gripsight_signals::{Poses, StateSequence, yaw_rates};
 
+use crate::coloured::beside_poses;
 use crate::state::Drive;
 
 /// Standard deviations of white noise, and strengths of what drives the motion.
@@ -35,7 +36,7 @@ pub struct Levels {
 const LEAST: [f64; 6] = [2e-3, 1e-3, 5e-3, 2e-3, 0.02, 0.02];
 
 impl Levels {
-    /// Looks at a sequence and its poses.
+    /// Looks at a sequence and its poses, whose delay is taken off.
     #[must_use]
     pub fn of(sequence: &StateSequence, poses: &Poses) -> Self {
         let wide = |values: &[f32]| values.iter().map(|&v| f64::from(v)).collect::<Vec<_>>();
@@ -56,7 +57,7 @@ impl Levels {
         };
         let change_a_x =
             if v_x.iter().any(|&v| v != 0.0) { walk(&time_s, &v_x, 2, v_x_noise) } else { 100.0 };
-        Self {
+        let levels = Self {
             position_m: position,
             heading_rad: heading,
             v_x_mps: v_x_noise,
@@ -68,6 +69,14 @@ impl Levels {
             late_s: 0.03,
             arm_m: 0.3 * (typical / 5.0).clamp(0.5, 5.0),
             change: [change_a_x.clamp(1.0, 1e4), change_a_y.clamp(4.0, 1e4), change_alpha.clamp(4.0, 1e5)],
+        };
+        let [v_x, r, a_x, a_y] = beside_poses(sequence, poses, &levels);
+        Self {
+            v_x_mps: levels.v_x_mps.max(v_x),
+            yaw_rate_radps: levels.yaw_rate_radps.max(r),
+            a_x_mps2: levels.a_x_mps2.max(a_x),
+            a_y_mps2: levels.a_y_mps2.max(a_y),
+            ..levels
         }
     }
 

@@ -43,8 +43,8 @@ struct Step {
     transition: Matrix,
     predicted: (Vector, Matrix),
     known: (Vector, Matrix),
-    /// Whether place and heading began anew here: nothing of them goes back.
-    jumped: bool,
+    /// How many of the first states began anew here: nothing of them goes back.
+    anew: usize,
 }
 
 /// Poses that a beginning needs.
@@ -70,7 +70,9 @@ pub fn smooth(sequence: &StateSequence) -> Result<Smoothed, StateError> {
     let delay = pose_delay_s(sequence, &poses);
     // Without a yaw rate the delay rests on the poses alone; with one, on a fit whose spread is known.
     let late_s = delay.map_or(0.03, |(_, sigma_s)| (3.0 * sigma_s).clamp(0.005, 0.03));
-    let levels = Levels { late_s, ..Levels::of(sequence, &poses) };
+    let mut in_time = poses.clone();
+    in_time.time_s.iter_mut().for_each(|t| *t -= delay.map_or(0.0, |d| d.0));
+    let levels = Levels { late_s, ..Levels::of(sequence, &in_time) };
     let mut filter = Filter::new(levels);
     begin(&mut filter, sequence, &poses);
     let events = events(sequence, &poses, delay.map_or(0.0, |d| d.0));
@@ -88,8 +90,8 @@ pub fn smooth(sequence: &StateSequence) -> Result<Smoothed, StateError> {
         if !(filter.s.iter().all(|v| v.is_finite()) && filter.p.diagonal().iter().all(|v| *v >= 0.0)) {
             return Err(StateError::Diverged { time_s });
         }
-        let jumped = filter.jumps_s.len() > jumps;
-        steps.push(Step { time_s, transition, predicted, known: (filter.s, filter.p), jumped });
+        let anew = if filter.jumps_s.len() > jumps { filter.anew } else { 0 };
+        steps.push(Step { time_s, transition, predicted, known: (filter.s, filter.p), anew });
     }
     back(&mut steps)?;
     let last = steps.last().ok_or(StateError::NothingMeasured)?;
@@ -143,25 +145,21 @@ fn back(steps: &mut [Step]) -> Result<(), StateError> {
         let (early, late) = steps.split_at_mut(k + 1);
         let (here, next) = (&mut early[k], &late[0]);
         let mut cross = here.known.1 * next.transition.transpose();
-        if next.jumped {
-            // What lies beyond a jump says nothing of place and heading before it.
-            cross.fixed_columns_mut::<3>(0).fill(0.0);
-        }
+        // What lies beyond a jump says nothing of place and heading before it.
+        cross.columns_mut(0, next.anew).fill(0.0);
         let mut predicted = next.predicted.1;
         let mut later = next.known;
-        if next.jumped {
-            for i in 0..3 {
-                for j in 0..crate::state::N {
-                    if i != j {
-                        predicted[(i, j)] = 0.0;
-                        predicted[(j, i)] = 0.0;
-                        later.1[(i, j)] = 0.0;
-                        later.1[(j, i)] = 0.0;
-                    }
+        for i in 0..next.anew {
+            for j in 0..crate::state::N {
+                if i != j {
+                    predicted[(i, j)] = 0.0;
+                    predicted[(j, i)] = 0.0;
+                    later.1[(i, j)] = 0.0;
+                    later.1[(j, i)] = 0.0;
                 }
-                later.0[i] = next.predicted.0[i];
-                later.1[(i, i)] = predicted[(i, i)];
             }
+            later.0[i] = next.predicted.0[i];
+            later.1[(i, i)] = predicted[(i, i)];
         }
         let Some(cholesky) = predicted.cholesky() else {
             return Err(StateError::Diverged { time_s: next.time_s });

@@ -155,3 +155,20 @@ fn nothing_measured_is_said() {
     let silent = Recorded { position_m: 0.0, imu: false, speed: false, ..LOCALISED };
     assert_eq!(smooth(&drive(silent, 1).0), Err(StateError::NothingMeasured));
 }
+
+/// A differentiated and smoothed acceleration has no noise from sample to sample, and is wrong for tenths of a second: it must not outvote exact poses.
+#[test]
+fn an_acceleration_that_is_smooth_and_wrong_is_not_believed() {
+    let exact =
+        Recorded { position_m: 5e-4, heading_rad: 5e-4, delay_s: 0.0, imu: true, speed: true, jump: false };
+    let (mut s, truth) = drive(exact, 5);
+    for (k, a_y) in s.a_y_mps2.iter_mut().enumerate() {
+        let t = 0.01 * k as f32;
+        *a_y = (1.1 * 5.0) * (1.2 * (1.7 * t).sin() * (0.13 * t).cos()) + 0.8 * (9.0 * t).sin();
+    }
+    let smoothed = smooth(&s).unwrap();
+    let errors: Vec<f64> = smoothed.motion.iter().zip(&truth).map(|(m, v)| (m.v_y_mps - v).abs()).collect();
+    let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+    assert!(rms < 0.03, "v_y off by {rms:.3} m/s");
+    assert!(smoothed.jumps_s.is_empty(), "{:?}", smoothed.jumps_s);
+}

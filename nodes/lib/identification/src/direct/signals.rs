@@ -3,6 +3,7 @@
 use gripsight_vehicle::VehicleParameters;
 
 use crate::data::{Data, median};
+use crate::rollout::PARAMETERS;
 use gripsight_estimation::shooting::{Parameter, Prior};
 
 /// What is likely of the signals before the data are looked at: (mean, sigma, low, high) in the order of [`SignalCorrections`]; the lever
@@ -54,6 +55,8 @@ pub(super) fn signal_parameters(data: &Data, vehicle: &VehicleParameters) -> Vec
     for [mean, sigma, low, high] in [COMBINED_SLIP, LOAD_TRANSFER] {
         all.push(Parameter { start: mean, low, high, free: true, prior: Some(Prior { mean, sigma }) });
     }
+    // The scales of the motion's signals are held at one.
+    all.resize(PARAMETERS, Parameter { start: 1.0, low: 0.3, high: 3.0, free: false, prior: None });
     all
 }
 

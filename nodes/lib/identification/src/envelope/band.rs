@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::MagicFormula;
 
-use crate::direct::{covariance_of, force_error};
+use crate::direct::force_error;
 use crate::{Estimate, Identification};
 
 /// Points of a band.
@@ -63,7 +63,7 @@ pub(crate) fn half_width(
     slip_rad: &[f64],
 ) -> Vec<f64> {
     let fit = &run.direct.fit;
-    let covariance = covariance_of(fit, &[offset, offset + 1, offset + 2, offset + 3]);
+    let covariance = run.direct.covariance_of_axle(offset);
     let at: [f64; 4] = std::array::from_fn(|j| fit.parameters[offset + j]);
     let moved: [f64; 4] = std::array::from_fn(|j| at[j] + run.direct.shift[offset + j]);
     let curve = |v: [f64; 4]| MagicFormula::from_stiffness(v[0].max(0.0), v[1], v[2].max(1e-3), v[3]);

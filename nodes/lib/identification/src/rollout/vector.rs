@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 use crate::SignalCorrections;
 
 /// Number of parameters of [`TireRollout`](super::TireRollout): (k, C, D, E) front and rear with k = B C D, the
-/// signal corrections, the tires' relaxation length, how much longitudinal force takes from the lateral, and how much of the
-/// load transfer is felt.
-pub(crate) const PARAMETERS: usize = 17;
+/// signal corrections, the tires' relaxation length, how much longitudinal force takes from the lateral, how much of the
+/// load transfer is felt, and the scales of the motion's signals.
+pub(crate) const PARAMETERS: usize = 20;
 /// Place of the first signal correction.
 pub(crate) const SIGNALS: usize = 8;
 /// Place of the relaxation length.
@@ -17,6 +17,12 @@ pub(crate) const RELAXATION: usize = 14;
 pub(crate) const COMBINED: usize = 15;
 /// Place of the share of load transfer.
 pub(crate) const TRANSFER: usize = 16;
+/// Place of v_x as reported over the true one,
+pub(crate) const V_X_SCALE: usize = 17;
+/// of the same of the yaw rate,
+pub(crate) const YAW_RATE_SCALE: usize = 18;
+/// and of the share of the rear axle's sideslip that the reported v_y shows: an observer on tires that are too stiff shows less than one.
+pub(crate) const SLIP_SHARE: usize = 19;
 /// Names of the parameters, with their units where they have one.
 pub(crate) const NAMES: [&str; PARAMETERS] = [
     "front.k",
@@ -36,6 +42,9 @@ pub(crate) const NAMES: [&str; PARAMETERS] = [
     "relaxation_m",
     "combined_slip",
     "load_transfer",
+    "v_x_scale",
+    "yaw_rate_scale",
+    "v_y_slip_share",
 ];
 
 /// What the estimation allows for and Phi_p does not hold.
@@ -74,6 +83,7 @@ pub(crate) fn vector_of(
         RELAXATION => nuisance.relaxation_m,
         COMBINED => nuisance.combined_slip,
         TRANSFER => nuisance.load_transfer,
+        V_X_SCALE | YAW_RATE_SCALE | SLIP_SHARE => 1.0,
         _ => signals[j - SIGNALS],
     })
 }

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use gripsight_identification::{Config, FrictionPrior, Outcome, ResidualKind, Status, identify};
+use gripsight_identification::{Config, FrictionPrior, Outcome, ResidualKind, Status, Usable, identify};
 use gripsight_signals::StateSequence;
 use gripsight_vehicle::VehicleParameters;
 
@@ -124,4 +124,29 @@ fn a_prior_makes_a_set_beside_the_one_that_the_drive_shows() {
             assert!(set.phi_p.front.d > 0.97 * shown, "{mu}: {set:?}, shown {shown}");
         }
     }
+}
+
+/// Motion capture fails for tenths of a second here and there, and the accelerations are made of its poses.
+#[test]
+fn the_small_cars_poses_give_the_v_y_that_was_taken_away() {
+    let Some((sequence, vehicle)) = recorded("rc10_mocap", f64::INFINITY) else { return };
+    let mut without = sequence.clone();
+    without.v_y_mps.fill(0.0);
+    let usable = Usable::of(&without, &vehicle).unwrap();
+    assert!(usable.recorded.objections.is_empty(), "{:?}", usable.recorded.objections);
+    let mut errors: Vec<f64> = Vec::new();
+    let mut at = 0;
+    for (t, v_y) in usable.sequence.time_s.iter().zip(&usable.sequence.v_y_mps) {
+        at += sequence.time_s[at..].partition_point(|s| s < t);
+        errors.push(f64::from(v_y - sequence.v_y_mps[at]).abs());
+    }
+    errors.sort_unstable_by(f64::total_cmp);
+    assert!(errors.len() as f64 > 0.95 * sequence.len() as f64);
+    // Of slips of 27 degrees, at 1.7 m/s.
+    let (usual, large) = (errors[errors.len() / 2], errors[errors.len() * 99 / 100]);
+    assert!(usual < 0.01 && large < 0.05, "off by {usual:.4} usually, by {large:.4} one time in a hundred");
+    // What poses and gyroscope agree on is hardly in doubt; the wheels' angle is.
+    let doubt = usable.recorded.doubt;
+    assert!(doubt.v_x_scale < 0.02 && doubt.yaw_rate_scale < 0.02, "{doubt:?}");
+    assert!(doubt.steering_gain > 0.05, "{doubt:?}");
 }

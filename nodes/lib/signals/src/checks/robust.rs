@@ -10,6 +10,10 @@ pub(super) struct Slope {
 }
 
 impl Slope {
+    /// Where nothing tells.
+    pub(super) const UNKNOWN: Self =
+        Self { value: f64::NAN, low: f64::NAN, high: f64::NAN, offset: f64::NAN };
+
     /// The slope of the second over the first, where nothing but the first has noise.
     pub(super) fn inverse(self) -> Self {
         let (low, high) = (self.low.min(self.high), self.low.max(self.high));
@@ -113,6 +117,22 @@ pub(super) fn slope_beside(first: &[f64], second: &[f64], beside: &[&[f64]], lea
         fit(&kept).map(|f| f[0])
     })?;
     Some(Slope { value, low, high, offset: found[found.len() - 1] })
+}
+
+/// Root mean square of what others and an offset leave of a series, the largest twentieth apart; `None` where there is too little.
+pub(super) fn left_beside(series: &[f64], beside: &[&[f64]]) -> Option<f64> {
+    let rows: Vec<Vec<f64>> =
+        (0..series.len()).map(|i| beside.iter().map(|b| b[i]).chain([1.0]).collect()).collect();
+    let usable: Vec<usize> =
+        (0..rows.len()).filter(|&i| series[i].is_finite() && rows[i].iter().all(|v| v.is_finite())).collect();
+    let found = solve(&rows, series, &usable, &vec![1.0; usable.len()])?;
+    let mut squares: Vec<f64> = usable
+        .iter()
+        .map(|&i| (series[i] - rows[i].iter().zip(&found).map(|(a, b)| a * b).sum::<f64>()).powi(2))
+        .collect();
+    squares.sort_unstable_by(f64::total_cmp);
+    squares.truncate((squares.len() * 19).div_ceil(20));
+    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
 }
 
 /// Weighted least squares by normal equations; `None` where they are singular.

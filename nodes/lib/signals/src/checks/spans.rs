@@ -80,11 +80,19 @@ impl<'a> Spans<'a> {
         Some([self.pose(t[from].into())?, self.pose(t[to].into())?])
     }
 
-    pub(super) fn turns(&self) -> Pairs {
-        self.pairs(!self.poses.time_s.is_empty(), |span| {
-            let [a, b] = self.ends(span)?;
-            Some((self.integral(&self.sequence.yaw_rate_radps, span), b[2] - a[2]))
-        })
+    /// The turn by the yaw rate and by the heading over so many spans in a row, beginning at each.
+    pub(super) fn turns(&self, in_a_row: usize) -> Pairs {
+        let rows: Vec<(f64, f64)> = self
+            .spans
+            .windows(if self.poses.time_s.is_empty() { usize::MAX } else { in_a_row })
+            .filter(|w| w.windows(2).all(|two| two[0].1 == two[1].0))
+            .filter_map(|w| {
+                let span = (w[0].0, w[w.len() - 1].1);
+                let [a, b] = self.ends(span)?;
+                Some((self.integral(&self.sequence.yaw_rate_radps, span), b[2] - a[2]))
+            })
+            .collect();
+        (rows.len() >= 20 && rows.iter().any(|p| p.0 != 0.0)).then(|| rows.into_iter().unzip())
     }
 
     pub(super) fn gyro(&self) -> Pairs {

@@ -180,3 +180,16 @@ fn steering_in_degrees_and_turned_is_told_by_the_curves() {
     assert_eq!(of(-1.0), Finding::Sign);
     assert_eq!(of(57.295_78), Finding::Unit { signal: "steering", probably: "deg" });
 }
+
+#[test]
+fn a_v_y_that_goes_its_own_way_is_not_measured_whatever_its_share() {
+    let wave = |per: f64| (0..300).map(|k| (per * f64::from(k)).sin()).collect::<Vec<_>>();
+    let (known, turning, own) = (wave(0.31), wave(0.17), wave(0.53));
+    let reported = |share: f64| known.iter().zip(&own).map(|(k, o)| k + share * o).collect::<Vec<_>>();
+    let finding = |share| lateral_speed_check(&reported(share), &known, &turning, 0.01).finding;
+    assert_eq!(finding(0.1), Finding::Agrees);
+    assert!(matches!(finding(0.4), Finding::NotMeasured { .. }));
+    // Where it is not known better than that, nothing is said against it.
+    let unsure = lateral_speed_check(&reported(0.4), &known, &turning, 0.2).finding;
+    assert!(!unsure.disagrees(), "{unsure:?}");
+}

@@ -1,0 +1,166 @@
+//! What sensors are off by over tenths of a second, beside the poses.
+//!
+//! A filtered or differentiated signal has hardly any noise from sample to sample and is wrong all the same. Believed to its white noise it outvotes the
+//! poses. Over spans of some length the poses say the same change: what remains of the difference, beyond the poses' own noise, counts as the white
+//! noise that would leave as much.
+
+use gripsight_signals::{Poses, StateSequence, yaw_rates};
+use nalgebra::{DMatrix, DVector};
+
+use crate::levels::Levels;
+
+/// Lengths of the spans.
+const SPANS_S: [f64; 4] = [0.1, 0.2, 0.4, 0.8];
+/// A difference tells of a sensor where it is larger than what the poses' noise makes by this.
+const BEYOND: f64 = 1.5;
+/// Spans that a judgement needs.
+const LEAST_SPANS: usize = 20;
+
+/// One span: what the poses say less nothing else, what the sensor says and what may be wrong with it, and how many samples it is worth.
+struct Row {
+    by_pose: f64,
+    beside: [f64; 3],
+    samples: f64,
+}
+
+/// White noise of v_x, yaw rate, a_x and a_y that would leave what they leave beside the poses; zero where the poses do not tell.
+pub(crate) fn beside_poses(sequence: &StateSequence, poses: &Poses, white: &Levels) -> [f64; 4] {
+    let mut found = [0.0_f64; 4];
+    for span_s in SPANS_S {
+        let rows = rows(sequence, poses, span_s);
+        let noise = [
+            white.position_m * 2_f64.sqrt() / span_s,
+            white.heading_rad * 2_f64.sqrt() / span_s,
+            white.position_m * 6_f64.sqrt() / (span_s * span_s),
+            white.position_m * 6_f64.sqrt() / (span_s * span_s),
+        ];
+        for place in 0..4 {
+            if let Some((left, samples)) = left(&rows[place])
+                && left > BEYOND * noise[place]
+            {
+                let own = (left * left - noise[place].powi(2)).sqrt();
+                found[place] = found[place].max(own * samples.sqrt());
+            }
+        }
+    }
+    found
+}
+
+fn rows(sequence: &StateSequence, poses: &Poses, span_s: f64) -> [Vec<Row>; 4] {
+    let mut rows = [const { Vec::new() }; 4];
+    let time = |k: usize| f64::from(sequence.time_s[k]);
+    let n = sequence.len();
+    let rates = yaw_rates(sequence);
+    let has_speed = sequence.v_x_mps.iter().any(|&v| v != 0.0);
+    let has_forces = sequence.a_x_mps2.len() == n && sequence.a_y_mps2.len() == n;
+    let next = |from: usize| {
+        let t = poses.time_s[from];
+        let to = from + poses.time_s[from..].partition_point(|&p| p < t + span_s - 1e-6);
+        (to < poses.time_s.len() && poses.time_s[to] < t + 1.5 * span_s).then_some(to)
+    };
+    let mut a = 0;
+    while a < poses.time_s.len() {
+        let here = a;
+        // Neighbouring spans overlap by half: more would tell the same twice.
+        a += poses.time_s[a..].partition_point(|&p| p < poses.time_s[here] + 0.5 * span_s).max(1);
+        let Some(b) = next(here) else { continue };
+        let samples = |from_s: f64, to_s: f64| {
+            sequence.time_s.partition_point(|&t| f64::from(t) < from_s)
+                ..sequence.time_s.partition_point(|&t| f64::from(t) <= to_s)
+        };
+        let (from_s, to_s) = (poses.time_s[here], poses.time_s[b]);
+        let within = samples(from_s, to_s);
+        let count = within.len();
+        if (count as f64) < 0.5 * (to_s - from_s) * n as f64 / (time(n - 1) - time(0)).max(1e-3) || count < 2
+        {
+            continue;
+        }
+        let mean = |v: &[f32], range: std::ops::Range<usize>| {
+            let count = range.len() as f64;
+            v[range].iter().map(|&v| f64::from(v)).sum::<f64>() / count
+        };
+        let turned = poses.yaw_rad[b] - poses.yaw_rad[here];
+        if let Some(rates) = rates {
+            rows[1].push(Row {
+                by_pose: turned / (to_s - from_s),
+                beside: [mean(rates, within.clone()), 1.0, 0.0],
+                samples: count as f64,
+            });
+        }
+        if has_speed {
+            let (sin, cos) = (0.5 * (poses.yaw_rad[here] + poses.yaw_rad[b])).sin_cos();
+            let along = (poses.x_m[b] - poses.x_m[here]) * cos + (poses.y_m[b] - poses.y_m[here]) * sin;
+            rows[0].push(Row {
+                by_pose: along / (to_s - from_s),
+                beside: [mean(&sequence.v_x_mps, within), 1.0, 0.0],
+                samples: count as f64,
+            });
+        }
+        let Some(c) = next(b).filter(|_| has_forces) else { continue };
+        let until_s = poses.time_s[c];
+        let speed =
+            |p: &[f64], from: usize, to: usize| (p[to] - p[from]) / (poses.time_s[to] - poses.time_s[from]);
+        let change = |p: &[f64]| (speed(p, b, c) - speed(p, here, b)) / (0.5 * (until_s - from_s));
+        let (sin, cos) = poses.yaw_rad[b].sin_cos();
+        let (along, across) = (
+            cos * change(&poses.x_m) + sin * change(&poses.y_m),
+            cos * change(&poses.y_m) - sin * change(&poses.x_m),
+        );
+        // The second difference of positions is the mean acceleration under a triangle.
+        let (mut weights, mut squares, mut force) = (0.0, 0.0, [0.0; 2]);
+        let rate = |k: usize| rates.map_or(0.0, |r| f64::from(r[k]));
+        let (mut turning, mut turning2) = (0.0, 0.0);
+        for k in samples(from_s, until_s) {
+            let t = time(k);
+            let weight =
+                if t < to_s { (t - from_s) / (to_s - from_s) } else { (until_s - t) / (until_s - to_s) };
+            // The heading between the poses, from the middle one's.
+            let heading = if t < to_s {
+                -turned * (1.0 - (t - from_s) / (to_s - from_s))
+            } else {
+                (poses.yaw_rad[c] - poses.yaw_rad[b]) * (t - to_s) / (until_s - to_s)
+            };
+            let (sin, cos) = heading.sin_cos();
+            let (a_x, a_y) = (f64::from(sequence.a_x_mps2[k]), f64::from(sequence.a_y_mps2[k]));
+            force[0] += weight * (cos * a_x - sin * a_y);
+            force[1] += weight * (sin * a_x + cos * a_y);
+            turning2 += weight * rate(k).powi(2);
+            turning += if t < to_s { -rate(k) } else { rate(k) };
+            weights += weight;
+            squares += weight * weight;
+        }
+        if weights <= 0.0 || rates.is_none() {
+            continue;
+        }
+        // Scale, bias and the place of the unit are the filter's to find.
+        let samples = weights * weights / squares;
+        rows[2].push(Row { by_pose: along, beside: [force[0] / weights, 1.0, turning2 / weights], samples });
+        rows[3].push(Row { by_pose: across, beside: [force[1] / weights, 1.0, turning], samples });
+    }
+    rows
+}
+
+/// What is left of the first beside the others (half of it below and half above), and the samples that a span is worth.
+fn left(rows: &[Row]) -> Option<(f64, f64)> {
+    if rows.len() < LEAST_SPANS {
+        return None;
+    }
+    let mut kept: Vec<usize> = (0..rows.len()).collect();
+    let mut size = f64::INFINITY;
+    for _ in 0..3 {
+        let width = if rows.iter().all(|r| r.beside[2] == 0.0) { 2 } else { 3 };
+        let a = DMatrix::from_fn(kept.len(), width, |i, j| rows[kept[i]].beside[j]);
+        let y = DVector::from_fn(kept.len(), |i, _| rows[kept[i]].by_pose);
+        let found = a.svd(true, true).solve(&y, 1e-9).ok()?;
+        let off = |r: &Row| r.by_pose - (0..width).map(|j| found[j] * r.beside[j]).sum::<f64>();
+        let mut sizes: Vec<f64> = rows.iter().map(|r| off(r).abs()).collect();
+        let middle = sizes.len() / 2;
+        size = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.6745;
+        kept = (0..rows.len()).filter(|&i| off(&rows[i]).abs() <= 3.0 * size).collect();
+        if kept.len() < LEAST_SPANS / 2 {
+            return None;
+        }
+    }
+    let samples = rows.iter().map(|r| r.samples).sum::<f64>() / rows.len() as f64;
+    Some((size, samples))
+}
