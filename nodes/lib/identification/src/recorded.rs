@@ -171,7 +171,7 @@ impl Usable {
         let clean = masked(sequence)?;
         let mut checks = cross_check(&clean.sequence)?;
         checks.checks.extend(steering_check(&clean.sequence, vehicle.wheelbase_m())?);
-        if let Some(check) = sharper(&clean.sequence, &checks) {
+        if let Some(check) = contradictions.then(|| sharper(&clean.sequence, &checks)).flatten() {
             checks.checks.retain(|c| c.pair != check.pair);
             checks.checks.push(check);
         }

@@ -188,8 +188,8 @@ fn a_v_y_that_goes_its_own_way_is_not_measured_whatever_its_share() {
     let reported = |share: f64| known.iter().zip(&own).map(|(k, o)| k + share * o).collect::<Vec<_>>();
     let finding = |share| lateral_speed_check(&reported(share), &known, &turning, 0.01).finding;
     assert_eq!(finding(0.1), Finding::Agrees);
-    assert!(matches!(finding(0.4), Finding::NotMeasured { .. }));
+    assert!(matches!(finding(0.3), Finding::NotMeasured { .. }));
     // Where it is not known better than that, nothing is said against it.
-    let unsure = lateral_speed_check(&reported(0.4), &known, &turning, 0.2).finding;
+    let unsure = lateral_speed_check(&reported(0.3), &known, &turning, 0.2).finding;
     assert!(!unsure.disagrees(), "{unsure:?}");
 }
