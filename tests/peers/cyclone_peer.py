@@ -4,6 +4,8 @@
     cyclone_peer.py publish TOPIC TYPE [--qos ...]      messages as JSON lines on standard input; --times N sends each N times,
                                                         --stamp with the time of sending in its header
     cyclone_peer.py call SERVICE TYPE REQUEST           a service of a node under rmw_cyclonedds_cpp; REQUEST is JSON
+    cyclone_peer.py types TOPIC TYPE [--count N]        the types that endpoints of a topic are announced with, once N endpoints stand and
+                                                        none has come for two seconds; exit code 1: others than TYPE
 
 Messages are printed as JSON lines, one object each, with the field names of the .msg files; the line `ready` says that the
 endpoint stands. Exit code 1: not all messages came in time.
@@ -152,6 +154,26 @@ def publish(participant, args):
     return args.qos == "sensor" or writer.wait_for_acks(duration(seconds=args.timeout))
 
 
+def types(participant, args):
+    from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription
+
+    readers = [BuiltinDataReader(participant, kind) for kind in (BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription)]
+    print("ready", flush=True)
+    found, last = {}, time.monotonic()
+
+    def settled():
+        nonlocal last
+        for endpoint in (sample for reader in readers for sample in reader.take(N=100)):
+            if endpoint.sample_info.valid_data and endpoint.topic_name == "rt" + args.topic and endpoint.key not in found:
+                found[endpoint.key], last = endpoint.type_name, time.monotonic()
+        return len(found) >= args.count and time.monotonic() - last > 2.0
+
+    is_settled = wait_until(settled, args.timeout)
+    names = sorted({name.replace("::dds_::", "::").replace("::", "/").rstrip("_") for name in found.values()})
+    print(json.dumps(names), flush=True)
+    return is_settled and names == [args.type]
+
+
 def call(participant, args):
     package, name = args.type.split("/srv/")
     request_text, reply_text = SERVICES[name]
@@ -179,7 +201,7 @@ def call(participant, args):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("command", choices=["subscribe", "publish", "call"])
+    parser.add_argument("command", choices=["subscribe", "publish", "call", "types"])
     parser.add_argument("topic")
     parser.add_argument("type")
     parser.add_argument("request", nargs="?")
@@ -190,7 +212,7 @@ def main():
     parser.add_argument("--stamp", action="store_true")
     parser.add_argument("--timeout", type=float, default=20.0)
     args = parser.parse_args()
-    work = {"subscribe": subscribe, "publish": publish, "call": call}[args.command]
+    work = {"subscribe": subscribe, "publish": publish, "call": call, "types": types}[args.command]
     sys.exit(0 if work(DomainParticipant(int(os.environ.get("ROS_DOMAIN_ID", 0))), args) else 1)
 
 

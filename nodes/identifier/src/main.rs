@@ -1,6 +1,7 @@
 //! Node: residual models and a friction prior to Pacejka parameters. See the README beside this folder.
 
 mod diagnostics;
+mod memory;
 mod node;
 mod outputs;
 mod run;

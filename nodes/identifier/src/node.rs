@@ -7,7 +7,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use gripsight_bag::{Reassembler, decode};
 use gripsight_identification::export::{Provenance, TireFiles};
-use gripsight_identification::{Config, FrictionPrior, Method, Outcome, Status};
+use gripsight_identification::{Config, FrictionPrior, Method, Outcome, Status, vehicle_hash};
 use gripsight_identification_messages as messages;
 use gripsight_msgs::standard::ackermann_msgs::AckermannDriveStamped;
 use gripsight_msgs::standard::nav_msgs::Odometry;
@@ -35,7 +35,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
     let sensor = node.sensor_qos(50);
     let odometry = node.subscription::<Odometry>("odom", sensor)?;
     let drive = node.subscription::<AckermannDriveStamped>("drive", sensor)?;
-    let outputs = Outputs::new(node)?;
+    let outputs = Outputs::new(node, settings.output_folder.clone())?;
     let diagnostics = node.diagnostics();
 
     Ok(async move {
@@ -208,6 +208,7 @@ async fn identify_each(
     facts: &RefCell<Facts>,
 ) {
     outputs.waiting().await;
+    outputs.recall(&vehicle_hash(vehicle), settings.publish_provisional.get()).await;
     while sequences.changed().await.is_ok() {
         let Some(sequence) = sequences.borrow_and_update().clone() else { continue };
         let start = Instant::now();

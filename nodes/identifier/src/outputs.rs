@@ -1,15 +1,18 @@
 //! The node's publishers, and the messages that only it makes.
 
-use std::time::Duration;
+use std::path::Path;
+use std::time::{Duration, SystemTime};
 
 use gripsight_bag::encode;
 use gripsight_identification::{Candidate, Config, IterationRecord, Outcome, RunKey};
 use gripsight_identification_messages as messages;
 use gripsight_msgs::standard::std_msgs::Header;
 use gripsight_msgs::{Grip, IdentificationProgress as Progress, PacejkaParams};
-use gripsight_runtime::{Node, Publisher, Qos};
+use gripsight_runtime::{Node, Parameter, Publisher, Qos};
 use gripsight_signals::StateSequence;
 use gripsight_vehicle::VehicleParameters;
+
+use crate::memory;
 
 /// Where results go.
 pub(crate) struct Outputs {
@@ -17,15 +20,18 @@ pub(crate) struct Outputs {
     pacejka: Publisher<PacejkaParams>,
     grip: Publisher<Grip>,
     progress: Publisher<Progress>,
+    /// Where the set that the MPC was told last is kept; empty: nowhere.
+    folder: Parameter<String>,
 }
 
 impl Outputs {
-    pub(crate) fn new(node: &mut Node) -> Result<Self, gripsight_runtime::Error> {
+    pub(crate) fn new(node: &mut Node, folder: Parameter<String>) -> Result<Self, gripsight_runtime::Error> {
         Ok(Self {
             candidate: node.publisher("~/candidate", Qos::latched())?,
             pacejka: node.publisher("~/pacejka", Qos::latched())?,
             grip: node.publisher("~/grip", Qos::latched())?,
             progress: node.publisher("~/progress", Qos::latched())?,
+            folder,
         })
     }
 
@@ -47,9 +53,34 @@ impl Outputs {
         message
     }
 
-    /// Publishes a set on the MPC's topic.
+    /// Publishes a set on the MPC's topic, and keeps it for the next start.
     pub(crate) async fn publish(&self, message: &PacejkaParams) {
         self.pacejka.publish(message).await;
+        let folder = self.folder.get();
+        if !folder.is_empty()
+            && let Err(error) = memory::keep(Path::new(&folder), message, SystemTime::now())
+        {
+            tracing::error!("the set is not kept for the next start: {error}");
+        }
+    }
+
+    /// Publishes what the last start of this car knew, where there was one: as provisional, on the MPC's topic only where it takes such sets.
+    pub(crate) async fn recall(&self, vehicle_hash: &str, provisional: bool) {
+        let folder = self.folder.get();
+        if folder.is_empty() {
+            return;
+        }
+        match memory::recall(Path::new(&folder), vehicle_hash, SystemTime::now()) {
+            Ok(Some(set)) => {
+                tracing::info!("{}", set.reason);
+                self.candidate.publish(&set).await;
+                if provisional {
+                    self.pacejka.publish(&set).await;
+                }
+            }
+            Ok(None) => {}
+            Err(error) => tracing::warn!("what was known before this start is not used: {error}"),
+        }
     }
 
     /// Publishes how the set in force grips.

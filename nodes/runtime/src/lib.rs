@@ -29,7 +29,8 @@
 //! ```
 //!
 //! Not implemented: lifecycle nodes, composition, actions, services of a node's own other than triggers, and type
-//! hashes in discovery (ros2-client cannot announce them; both RMWs of ROS 2 Jazzy accept that).
+//! hashes in discovery: they travel as USER_DATA of an endpoint, which RustDDS 0.15.1 reads of others and cannot send (its QoS policies have
+//! none, and its announcements leave the parameter out); both RMWs of ROS 2 Jazzy accept that, rmw_cyclonedds with a warning.
 
 mod args;
 mod clock;
@@ -48,6 +49,7 @@ mod parameter_services;
 mod parameters;
 mod publisher;
 mod qos;
+mod readers;
 mod restart;
 mod run;
 mod subscription;

@@ -29,6 +29,7 @@ use crate::parameter_services::{ParameterServices, serve_trigger};
 use crate::parameters::{Descriptor, Parameter, ParameterStore};
 use crate::publisher::{PATIENCE, Publisher, REPLAY_PATIENCE, RawCdr, RawPublisher};
 use crate::qos::Qos;
+use crate::readers::Readers;
 use crate::subscription::{Subscription, forward};
 use crate::value::{ParameterType, ParameterValue};
 
@@ -68,7 +69,9 @@ pub struct Node {
     diagnostics: Diagnostics,
     tasks: JoinSet<()>,
     stop: watch::Sender<bool>,
-    // Dropped in this order: the node, which ends its spinner, then the context.
+    /// Who reads what the node publishes.
+    readers: Readers,
+    // Dropped in this order: the node, then the context.
     ros: Arc<Mutex<ros2_client::Node>>,
     context: Context,
     domain_id: u16,
@@ -109,8 +112,7 @@ impl Node {
         guard.watch(diagnostics.clone(), memory_limit);
 
         let context = context(&environment)?;
-        let mut ros = ros_node(&context, &identity)?;
-        let spinner = ros.spinner().map_err(|error| Error::create("spinner", error))?;
+        let ros = ros_node(&context, &identity)?;
         let mut node = Self {
             clock: if use_sim_time.get() { Clock::simulated() } else { Clock::default() },
             identity,
@@ -119,17 +121,14 @@ impl Node {
             diagnostics,
             tasks: JoinSet::new(),
             stop: watch::Sender::new(false),
+            readers: Readers::default(),
             ros: Arc::new(Mutex::new(ros)),
             context,
             domain_id: environment.domain_id,
             service_mappings: environment.service_mappings.clone(),
             changes: None,
         };
-        tokio::spawn(async move {
-            if let Err(error) = spinner.spin().await {
-                tracing::error!("the ROS 2 graph is no longer followed: {error}");
-            }
-        });
+        node.spawn(node.readers.clone().follow(node.context.domain_participant()));
         node.follow_clock(use_sim_time.get())?;
         node.publish_log(log_lines)?;
         node.publish_diagnostics()?;
@@ -202,9 +201,9 @@ impl Node {
         let writer = ros_topic(&ros, &topic, type_name, qos)
             .and_then(|dds| ros.create_publisher::<RawCdr>(&dds, Some(qos.profile())))
             .map_err(|error| Error::create(format!("publisher of {topic}"), error))?;
-        let (node, diagnostics) = (Arc::downgrade(&self.ros), self.diagnostics.clone());
+        let (readers, diagnostics) = (self.readers.clone(), self.diagnostics.clone());
         let is_full = AtomicBool::new(false);
-        Ok(RawPublisher { topic, writer, node, diagnostics, patience: REPLAY_PATIENCE, is_full })
+        Ok(RawPublisher { topic, writer, readers, diagnostics, patience: REPLAY_PATIENCE, is_full })
     }
 
     /// Subscribes to messages of type `M` on a topic (relative, `~/` private, or absolute).
@@ -344,8 +343,8 @@ impl Node {
     }
 
     /// `/parameter_events`: ros2-client publishes there whatever is set in its own store, which is kept in step for that alone; a second
-    /// publisher of this crate's would be one too many. It stamps with `/clock` of another type where its store says `use_sim_time`, so
-    /// that parameter stays out.
+    /// publisher of this crate's would be one too many. It stamps with a clock of its own, which nobody
+    /// sets, where its store says `use_sim_time`, so that parameter stays out.
     fn tell_changes(&mut self, mut waiting: mpsc::Receiver<(String, ParameterValue)>) {
         let ros = Arc::downgrade(&self.ros);
         self.spawn(async move {

@@ -6,7 +6,6 @@
 
 use std::marker::PhantomData;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError, Weak};
 use std::time::Duration;
 
 use byteorder::LittleEndian;
@@ -14,6 +13,7 @@ use gripsight_msgs::Message;
 use serde::ser::{Serialize, SerializeTuple, Serializer};
 
 use crate::diagnostics::Diagnostics;
+use crate::readers::Readers;
 
 /// A message waits this long for room; RustDDS 0.15.1 looks at its own limit only when there is room.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(1);
@@ -47,7 +47,7 @@ impl Serialize for RawCdr {
 pub struct RawPublisher {
     pub(crate) topic: String,
     pub(crate) writer: ros2_client::Publisher<RawCdr>,
-    pub(crate) node: Weak<Mutex<ros2_client::Node>>,
+    pub(crate) readers: Readers,
     pub(crate) diagnostics: Diagnostics,
     pub(crate) patience: Duration,
     /// The last message found no room.
@@ -76,9 +76,7 @@ impl RawPublisher {
 
     /// Subscriptions that are connected now.
     pub fn subscriptions(&self) -> usize {
-        self.node.upgrade().map_or(0, |node| {
-            self.writer.get_subscription_count(&node.lock().unwrap_or_else(PoisonError::into_inner))
-        })
+        self.readers.of(self.writer.guid())
     }
 }
 

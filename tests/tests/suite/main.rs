@@ -4,8 +4,10 @@
 
 mod bag_player;
 mod camera_prior;
+mod fault_injector;
 mod gap_diagnosis;
 mod guard;
+mod hostile;
 mod identification;
 mod packaging;
 mod parameters;

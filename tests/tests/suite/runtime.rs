@@ -43,6 +43,23 @@ fn both_peers_decode_every_field() {
     assert_eq!(message::<PacejkaParams>(&early_fast), expected, "Fast DDS");
 }
 
+/// Tools of ROS 2 neither show nor record a topic that has two types.
+#[test]
+fn a_peer_sees_one_type_on_the_clock() {
+    let cyclone = cyclone();
+    if !available(std::slice::from_ref(&cyclone)) {
+        return;
+    }
+    let domain = Domain::new();
+    let arguments = ["types", "/clock", "rosgraph_msgs/msg/Clock", "--count", "2", "--timeout", "25"];
+    let mut peer = start_cyclone(&domain, &cyclone.unwrap(), &arguments);
+    // A node that gives the time, and one that takes it.
+    let _giver = node(&domain, "sim_car", &["-p", "publish_clock:=true"]);
+    let _taker = source(&domain, &["-p", "use_sim_time:=true"]);
+    assert_eq!(message::<Vec<String>>(&peer), ["rosgraph_msgs/msg/Clock"]);
+    assert!(peer.wait(PATIENCE).success());
+}
+
 #[test]
 fn late_joiners_get_the_last_result() {
     let (cyclone, fast_dds) = (cyclone(), fast_dds());

@@ -97,7 +97,7 @@ fn date_of(mpc_file: &Path) -> String {
 /// Keeps what stands at a place under another name, where the new text differs.
 fn keep(place: &Path, text: &str, kept: &Path) -> Result<(), ExportError> {
     match fs::read(place) {
-        Ok(old) if old != text.as_bytes() => replace_bytes(kept, &old),
+        Ok(old) if old != text.as_bytes() => replace_file(kept, &old),
         Ok(_) => Ok(()),
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(()),
         Err(source) => Err(ExportError::Io { path: place.to_owned(), source }),
@@ -105,11 +105,15 @@ fn keep(place: &Path, text: &str, kept: &Path) -> Result<(), ExportError> {
 }
 
 fn replace(place: &Path, text: &str) -> Result<(), ExportError> {
-    replace_bytes(place, text.as_bytes())
+    replace_file(place, text.as_bytes())
 }
 
-/// Writes beside the place and renames: a reader sees the old file or the new one.
-fn replace_bytes(place: &Path, bytes: &[u8]) -> Result<(), ExportError> {
+/// Writes a file beside its place and renames it: a reader, and whoever comes after a process that was killed, sees the old file or the
+/// new one, whole.
+///
+/// # Errors
+/// [`ExportError::Io`].
+pub fn replace_file(place: &Path, bytes: &[u8]) -> Result<(), ExportError> {
     let mut name = OsString::from(".");
     name.push(place.file_name().unwrap_or_default());
     name.push(format!(".{}.tmp", std::process::id()));
