@@ -8,7 +8,7 @@ of a drive of 62 s. Writes OUT/runs.csv (a row a run, those without faults first
 
 A set is harmful where it promises, anywhere within its slips, more than 10 % of the largest true force driven above the true curve, which is the
 Magic Formula fitted to the plant's own F_y / F_z. A run has recovered when every node lives and reports, the last window has been identified, and
-a usable set came from a window that ended after the last fault. It hangs when a node does not end within 2 s of SIGINT.
+a usable set came from a window that ended after the last fault, and every file written is whole. It hangs when a node does not end within 2 s of SIGINT.
 """
 
 import argparse
@@ -24,6 +24,7 @@ import threading
 import time
 
 import numpy as np
+import yaml
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DURATION_S = 62
@@ -165,7 +166,8 @@ class Run:
 
     def node(self, name, program=None, extra=()):
         files = ["--params-file", ROOT / "params/suite.yaml", "--params-file", self.drive.vehicle]
-        self.start(name, [*files, *NODES[program or name], *extra], program)
+        kept = ["-p", f"output_folder:={self.logs / 'files'}"] if "identifier" in (name, program) else []
+        self.start(name, [*files, *NODES[program or name], *kept, *extra], program)
 
     def injector(self, draw):
         lot = ["-p", f"draw:={draw}", "-p", f"seed:={self.seed}", "-p", f"from_s:={SPAN_S[0]}", "-p", f"to_s:={SPAN_S[1]}"]
@@ -233,7 +235,7 @@ class Run:
         topic_faults = [words[words.index("of") + 2:] if "of" in words else words for words in topic_faults]
         ends = [float(f[2]) + float(f[3]) for f in topic_faults] + [at + 1.5 * self.args.rate for _, at in made]
         last_fault = began + max(ends, default=0.0) / self.args.rate
-        newest = lambda: max((m.handshake.sequence_id for _, m in self.heard.since(start, "window")), default=None)
+        newest = lambda: next((m.handshake.sequence_id for _, m in reversed(self.heard.since(start, "window"))), None)
         results = lambda: [(w, m) for w, m in self.heard.since(start, "end") if m.status != PROPOSED]
         done = lambda: any(m.handshake.sequence_id == newest() for _, m in results())
         identified = wait(done, LAST_RUN_S)
@@ -247,7 +249,8 @@ class Run:
         usable = [m for _, m in results() if m.status in USABLE and ended.get(m.handshake.sequence_id, 0.0) > last_fault]
         sets = [m for _, m in self.heard.since(start, "set") if m.status in USABLE]
         promised = [self.drive.promised_too_much(m) for m in sets]
-        for text, found in (("the last window was not identified", not identified), (f"silent: {silent}", silent), (f"ended: {dead}", dead)):
+        torn = [path.name for path in (self.logs / "files").glob("[!.]*.yaml") if not whole(path)]
+        for text, found in ((f"not whole: {torn}", torn), ("the last window was not identified", not identified), (f"silent: {silent}", silent), (f"ended: {dead}", dead)):
             if found:
                 self.notes.append(text)
         if not usable:
@@ -256,7 +259,7 @@ class Run:
         row = {
             "drive": self.drive.name, "seed": self.seed, "faults": len(topic_faults) + len(made), "sets": len(sets),
             "usable_after": len(usable), "promised_too_much": f"{max(promised, default=math.nan):.4f}",
-            "harmful": sum(p > HARMFUL for p in promised), "recovered": int(identified and not silent and not dead and bool(usable)),
+            "harmful": sum(p > HARMFUL for p in promised), "recovered": int(identified and not silent and not dead and not torn and bool(usable)),
             "hang": int(took > END_S), "end_s": f"{took:.2f}", "played_s": f"{played - began:.1f}", "note": " | ".join(self.notes),
         }
         faults = [(f[0], f[1], f[2], f[3], f[4]) for f in topic_faults] + [(kind, "", f"{at:.2f}", "", "") for kind, at in made]
@@ -276,6 +279,14 @@ class Run:
         for process in alive:
             process.kill()
         return math.inf
+
+
+def whole(path):
+    """Whether a file that the identifier wrote can be read."""
+    try:
+        return bool(yaml.safe_load(path.read_text()))
+    except yaml.YAMLError:
+        return False
 
 
 def plain(text):

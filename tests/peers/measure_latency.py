@@ -3,16 +3,18 @@
     measure_latency.py BAG [--seconds 600] [--hz 200] [--ends 20] [--bin FOLDER]
 
 BAG is one of `gripsight simulate`, with its truth and vehicle file beside it. Its motion is published at --hz in real time, over and over, odometry
-and drive commands both, with the stamps of the moment; telemetry, s4_residual and identifier run as they do on a car. Latency: this process's clock
+and drive commands both, stamped every 1/HZ s; telemetry, s4_residual and identifier run as they do on a car. Latency: this process's clock
 at the writing of a sample and at the arrival of its residual, so the peer's own share counts. Lost: odometry without a residual, from the
 first residual on. The end: SIGINT to each of the three nodes at work, --ends times, until its process has gone.
 """
 
 import argparse
 import csv
+import math
 import os
 import pathlib
 import signal
+import struct as binary
 import subprocess
 import threading
 import time
@@ -37,34 +39,45 @@ def start(binaries, name, vehicle):
 
 
 class Car:
-    """A bag's motion, at any rate."""
+    """A bag's motion at a rate, serialized before the first message: this process shall cost little."""
 
-    def __init__(self, bag, participant):
+    def __init__(self, bag, participant, hz):
         with bag.with_suffix(".truth.csv").open() as file:
             rows = list(csv.DictReader(file))
         column = lambda name: np.array([float(row[name]) for row in rows])
-        self.time = column("stamp_s") - float(rows[0]["stamp_s"])
+        times = column("stamp_s") - float(rows[0]["stamp_s"])
         names = ("x_m", "y_m", "heading_rad", "v_x_mps", "v_y_mps", "yaw_rate_radps", "steering_front_rad")
-        self.columns = [column(name) for name in names]
-        self.kinds = struct("nav_msgs", "Odometry"), struct("ackermann_msgs", "AckermannDriveStamped")
+        self.hz = hz
+        moments = np.arange(0.0, times[-1], 1.0 / hz)
+        columns = np.stack([np.interp(moments, times, column(name)) for name in names], axis=1)
+        kinds = struct("nav_msgs", "Odometry"), struct("ackermann_msgs", "AckermannDriveStamped")
         self.writers = [DataWriter(participant, Topic(participant, topic, kind), qos("sensor"))
-                        for topic, kind in zip(("rt/odom", "rt/drive"), self.kinds)]
-        self.noise = np.random.default_rng(1)
+                        for topic, kind in zip(("rt/odom", "rt/drive"), kinds)]
+        columns[:, 3:6] += np.random.default_rng(1).normal(0, (0.02, 0.01, 0.01), (len(columns), 3))
+        self.wires = [tuple(map(bytearray, self.wire(kinds, row))) for row in columns.tolist()]
+        self.samples = [build(kind, None) for kind in kinds]
+        for kind in kinds:
+            kind.serialize = lambda sample, **_: bytes(sample.bytes_now)
 
-    def publish(self, at_s):
-        """Writes odometry and drive of this time; gives their stamp."""
-        x, y, heading, v_x, v_y, yaw_rate, steering = (float(np.interp(at_s % self.time[-1], self.time, column)) for column in self.columns)
-        v_x, v_y, yaw_rate = (value + float(self.noise.normal(0, sigma)) for value, sigma in ((v_x, 0.02), (v_y, 0.01), (yaw_rate, 0.01)))
-        now = time.time_ns()
-        header = {"stamp": {"sec": now // 10**9, "nanosec": now % 10**9}, "frame_id": "map"}
-        pose = {"pose": {"position": {"x": x, "y": y}, "orientation": {"z": np.sin(heading / 2).item(), "w": np.cos(heading / 2).item()}}}
+    @staticmethod
+    def wire(kinds, row):
+        x, y, heading, v_x, v_y, yaw_rate, steering = row
+        pose = {"pose": {"position": {"x": x, "y": y}, "orientation": {"z": math.sin(heading / 2), "w": math.cos(heading / 2)}}}
         twist = {"twist": {"linear": {"x": v_x, "y": v_y}, "angular": {"z": yaw_rate}}}
-        drive = build(self.kinds[1], {"header": header, "drive": {"steering_angle": steering, "speed": v_x}})
-        odometry = build(self.kinds[0], {"header": header, "child_frame_id": "base_link", "pose": pose, "twist": twist})
-        self.writers[1].write(drive)
+        header = {"frame_id": "map"}
+        odometry = build(kinds[0], {"header": header, "child_frame_id": "base_link", "pose": pose, "twist": twist})
+        drive = build(kinds[1], {"header": header, "drive": {"steering_angle": steering, "speed": v_x}})
+        return odometry.serialize(), drive.serialize()
+
+    def publish(self, index, stamp_ns):
+        """Writes drive and odometry of a moment, in this order; gives when."""
+        for sample, wire in zip(self.samples, self.wires[index % len(self.wires)]):
+            binary.pack_into("<iI", wire, 4, *divmod(stamp_ns, 10**9))
+            sample.bytes_now = wire
+        self.writers[1].write(self.samples[1])
         written = time.monotonic()
-        self.writers[0].write(odometry)
-        return now, written
+        self.writers[0].write(self.samples[0])
+        return written
 
 
 def ends(binaries, vehicle, count):
@@ -96,7 +109,7 @@ def main():
     vehicle = args.bag.with_suffix(".vehicle.yaml")
     os.environ["CYCLONEDDS_URI"] = CYCLONE
     participant = DomainParticipant(int(os.environ.get("ROS_DOMAIN_ID", 0)))
-    car = Car(args.bag, participant)
+    car = Car(args.bag, participant, args.hz)
     reader = DataReader(participant, Topic(participant, "rt/s4_residual/residual", struct("gripsight_msgs", "Residual")), qos("reliable"))
     processes = [start(args.bin, name, vehicle) for name in NODES]
     sent, heard, running = {}, {}, True
@@ -111,13 +124,14 @@ def main():
     try:
         wait(lambda: all(len(writer.get_matched_subscriptions()) >= 2 for writer in car.writers), 20)
         threading.Thread(target=listen, daemon=True).start()
-        begun, end, late = time.monotonic(), None, []
+        begun, begun_ns, end, late = time.monotonic(), time.time_ns(), None, []
         index = 0
         while end is None or time.monotonic() < end:
             due = begun + index / args.hz
             time.sleep(max(0.0, due - time.monotonic()))
             late.append(time.monotonic() - due)
-            stamp, written = car.publish(index / args.hz)
+            stamp = begun_ns + int(1e9 * index / args.hz)
+            written = car.publish(index, stamp)
             index += 1
             if heard and end is None:
                 end = time.monotonic() + args.seconds

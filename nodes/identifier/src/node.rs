@@ -330,8 +330,11 @@ fn write_files(outcome: &Outcome, sequence: &StateSequence, settings: &Settings)
         floor: &settings.floor.get(),
         driven_mps: outcome.v_x_range_mps.high,
     };
-    match files.write(Path::new(&folder)) {
-        Ok(_) => tracing::info!("files written to {folder}"),
+    let folder = Path::new(&folder);
+    // Where it cannot be made, the writing says why.
+    std::fs::create_dir_all(folder).ok();
+    match files.write(folder) {
+        Ok(_) => tracing::info!("files written to {}", folder.display()),
         Err(error) => tracing::error!("files not written: {error}"),
     }
 }

@@ -23,8 +23,9 @@ use crate::diagnostics::{Activity, Figures, status};
 use crate::live::Live;
 use crate::recent::Recent;
 
-/// Sequences and models kept for candidates that come late or again.
-const KEPT: usize = 8;
+/// Sequences and models kept for candidates that come late or again. As many as telemetry keeps for late joiners: an identifier that has
+/// started again begins with the oldest of those.
+const KEPT: usize = 24;
 
 /// Declares parameters and topics; gives the node's work.
 pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyhow::Result<()>> + use<>> {
@@ -71,6 +72,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
         models: Recent::new(KEPT),
         waiting: None,
         training: None,
+        next: None,
         activity: Activity::Idle,
         figures: Figures::default(),
         output: node.publisher("~/model", Qos::latched())?,
@@ -127,6 +129,25 @@ async fn ended(training: &mut Option<Training>) -> Result<Trained, tokio::task::
     }
 }
 
+/// When a candidate is trained.
+#[derive(Debug, PartialEq)]
+enum Turn {
+    /// It is.
+    Running,
+    /// At once; what is trained now is of the same run, and nobody waits for it any more.
+    Now,
+    /// After what is trained now. Two identifiers on one topic, each repeating its candidate, would else end each other's trainings for good.
+    Next,
+}
+
+fn turn(training: Option<&RunKey>, candidate: &RunKey) -> Turn {
+    match training {
+        Some(training) if training == candidate => Turn::Running,
+        Some(training) if training.run_id != candidate.run_id => Turn::Next,
+        _ => Turn::Now,
+    }
+}
+
 struct Learner {
     vehicle: Arc<VehicleParameters>,
     hash: String,
@@ -137,6 +158,8 @@ struct Learner {
     /// The candidate whose sequence has not come yet.
     waiting: Option<Candidate>,
     training: Option<Training>,
+    /// The newest candidate of another run, while one is trained.
+    next: Option<Candidate>,
     activity: Activity,
     figures: Figures,
     output: Publisher<ModelMessage>,
@@ -170,14 +193,19 @@ impl Learner {
         self.answer(candidate).await;
     }
 
-    /// Answers at once where the model is known, else trains it; a candidate asked for again while it is trained is left to that.
+    /// Answers at once where the model is known, else trains it, in its turn.
     async fn answer(&mut self, candidate: Candidate) {
         if let Some(model) = self.models.get(&candidate.key) {
             self.output.publish(&model).await;
             return;
         }
-        if self.training.as_ref().is_some_and(|t| t.key == candidate.key) {
-            return;
+        match turn(self.training.as_ref().map(|training| &training.key), &candidate.key) {
+            Turn::Running => return,
+            Turn::Next => {
+                self.next = Some(candidate);
+                return;
+            }
+            Turn::Now => {}
         }
         let Some(sequence) = self.sequences.get(&candidate.key.sequence_id) else {
             self.activity = Activity::WaitingForSequence { sequence_id: candidate.key.sequence_id };
@@ -233,10 +261,34 @@ impl Learner {
             Ok((Err(error), _)) => self.fail(error.to_string()),
             Err(error) => self.fail(format!("the training ended abnormally: {error}")),
         }
+        if let Some(candidate) = self.next.take() {
+            self.answer(candidate).await;
+        }
     }
 
     fn fail(&mut self, reason: String) {
         tracing::error!("{reason}");
         self.activity = Activity::Failed { reason };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_run_waits_its_turn_and_a_newer_candidate_of_the_same_does_not() {
+        let key = |run_id: &str, iteration| RunKey {
+            run_id: run_id.into(),
+            sequence_id: 1,
+            iteration,
+            vehicle_hash: "c0ffee".into(),
+            seed: 0,
+        };
+        let training = key("a", 1);
+        assert_eq!(turn(None, &training), Turn::Now);
+        assert_eq!(turn(Some(&training), &key("a", 1)), Turn::Running);
+        assert_eq!(turn(Some(&training), &key("a", 2)), Turn::Now);
+        assert_eq!(turn(Some(&training), &key("b", 0)), Turn::Next);
     }
 }

@@ -479,6 +479,10 @@ mod tests {
             matches!(nan, SignalError::NotFinite { topic: "drive", field: "steering_angle_rad", .. }),
             "{nan}"
         );
+        // A bit of an exponent: no float32 holds it, and the window would be lost.
+        let Measurement::Odometry(far) = odometry(30) else { panic!() };
+        let far = aligner.push(Measurement::Odometry(OdometrySample { x_m: -1e200, ..far })).unwrap_err();
+        assert!(matches!(far, SignalError::NotFinite { topic: "odom", field: "x_m", .. }), "{far}");
     }
 
     #[test]

@@ -2,6 +2,9 @@
 
 use crate::{NS_PER_S, Signal, SignalError, Values};
 
+/// Largest size of a value: nothing on a car is, in any unit.
+const LARGEST: f64 = 1e18;
+
 /// Pose in a fixed frame and velocity in the car's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct OdometrySample {
@@ -173,11 +176,15 @@ impl Measurement {
     }
 
     /// # Errors
-    /// [`SignalError::NotFinite`] names the first field that is NaN or infinite; `index` is the message's place in its stream.
+    /// [`SignalError::NotFinite`] names the first field that is NaN, infinite or beyond what a sequence's float32 holds with its square: one such
+    /// value would cost every window that it is in. `index` is the message's place in its stream.
     pub fn check_finite(&self, index: usize) -> Result<(), SignalError> {
         let topic = self.stream();
         let stamp_s = self.stamp_ns() as f64 / NS_PER_S;
-        let check = |fields: &[(&'static str, f64)]| match fields.iter().find(|(_, v)| !v.is_finite()) {
+        let check = |fields: &[(&'static str, f64)]| match fields
+            .iter()
+            .find(|(_, v)| v.is_nan() || v.abs() > LARGEST)
+        {
             Some(&(field, value)) => Err(SignalError::NotFinite { topic, field, value, stamp_s, index }),
             None => Ok(()),
         };
