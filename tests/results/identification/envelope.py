@@ -125,4 +125,5 @@ def main():
     (HERE / "envelope.md").write_text("\n".join(text).rstrip() + "\n")
 
 
-main()
+if __name__ == "__main__":
+    main()

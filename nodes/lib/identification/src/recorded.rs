@@ -321,9 +321,9 @@ impl Judge<'_> {
         }
         let by_pose = self.disagrees(Pair::LateralSpeedAndPose);
         let by_force = self.disagrees(Pair::LateralSpeedAndAcceleration);
-        let vouched =
-            [Pair::LateralSpeedAndPose, Pair::LateralSpeedAndAcceleration].iter().any(|&p| self.agrees(p));
-        let Some(check) = by_pose.or(by_force).filter(|_| !vouched) else { return };
+        // What poses say has the accelerations in it.
+        let by_force = by_force.filter(|_| !self.agrees(Pair::LateralSpeedAndPose));
+        let Some(check) = by_pose.or(by_force) else { return };
         match check.finding {
             Finding::NotMeasured { share } if localised => {
                 wanted.push(("v_y_mps", Why::Contradicted { pair: check.pair, ratio: share }));

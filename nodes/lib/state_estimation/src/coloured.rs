@@ -19,40 +19,79 @@ const LEAST_SPANS: usize = 20;
 /// One span: what the poses say less nothing else, what the sensor says and what may be wrong with it, and how many samples it is worth.
 struct Row {
     by_pose: f64,
-    beside: [f64; 3],
+    beside: [f64; 4],
     samples: f64,
 }
 
-/// White noise of v_x, yaw rate, a_x and a_y that would leave what they leave beside the poses; zero where the poses do not tell.
-pub(crate) fn beside_poses(sequence: &StateSequence, poses: &Poses, white: &Levels) -> [f64; 4] {
-    let mut found = [0.0_f64; 4];
+/// The levels with what shows over tenths of a second.
+///
+/// Whose it is: where way and both accelerations ask for it alike, it is the localisation that wanders, and the least of what they ask for is its share, the
+/// heading's with it. The rest is the sensors'.
+pub(crate) fn with_coloured(sequence: &StateSequence, poses: &Poses, white: Levels) -> Levels {
+    let mut all = white;
     for span_s in SPANS_S {
         let rows = rows(sequence, poses, span_s);
-        let noise = [
-            white.position_m * 2_f64.sqrt() / span_s,
-            white.heading_rad * 2_f64.sqrt() / span_s,
-            white.position_m * 6_f64.sqrt() / (span_s * span_s),
-            white.position_m * 6_f64.sqrt() / (span_s * span_s),
+        // How an error of one coordinate of one pose shows.
+        let shows = [
+            2_f64.sqrt() / span_s,
+            2_f64.sqrt() / span_s,
+            6_f64.sqrt() / (span_s * span_s),
+            6_f64.sqrt() / (span_s * span_s),
         ];
+        let [mut left_m, mut samples] = [[0.0_f64; 4]; 2];
+        let mut told = true;
         for place in 0..4 {
-            if let Some((left, samples)) = left(&rows[place])
-                && left > BEYOND * noise[place]
-            {
-                let own = (left * left - noise[place].powi(2)).sqrt();
-                found[place] = found[place].max(own * samples.sqrt());
-            }
+            let white = if place == 1 { white.heading_rad } else { white.position_m };
+            let Some((size, worth)) = left(&rows[place]) else {
+                told &= place == 1;
+                continue;
+            };
+            let own = (size / shows[place]).powi(2) - white * white;
+            left_m[place] = if size > BEYOND * white * shows[place] { own.max(0.0).sqrt() } else { 0.0 };
+            samples[place] = worth;
         }
+        let wanders_m = if told { left_m[0].min(left_m[2]).min(left_m[3]) } else { 0.0 };
+        let wanders_rad = if wanders_m > 0.0 { left_m[1] } else { 0.0 };
+        let per_s = poses.time_s.len() as f64
+            / (poses.time_s.last().copied().unwrap_or(1.0) - poses.time_s[0]).max(span_s);
+        let many = (per_s * span_s).max(1.0).sqrt();
+        all.position_m = all.position_m.max(white.position_m.hypot(wanders_m * many));
+        all.heading_rad = all.heading_rad.max(white.heading_rad.hypot(wanders_rad * many));
+        let rest = |place: usize, wanders: f64| {
+            (left_m[place].powi(2) - wanders * wanders).max(0.0).sqrt() * shows[place] * samples[place].sqrt()
+        };
+        all.v_x_mps = all.v_x_mps.max(rest(0, wanders_m));
+        all.yaw_rate_radps = all.yaw_rate_radps.max(rest(1, wanders_rad));
+        all.a_x_mps2 = all.a_x_mps2.max(rest(2, wanders_m));
+        all.a_y_mps2 = all.a_y_mps2.max(rest(3, wanders_m));
     }
-    found
+    all
 }
 
 fn rows(sequence: &StateSequence, poses: &Poses, span_s: f64) -> [Vec<Row>; 4] {
     let mut rows = [const { Vec::new() }; 4];
+    if sequence.len() < 2 {
+        return rows;
+    }
     let time = |k: usize| f64::from(sequence.time_s[k]);
     let n = sequence.len();
     let rates = yaw_rates(sequence);
     let has_speed = sequence.v_x_mps.iter().any(|&v| v != 0.0);
     let has_forces = sequence.a_x_mps2.len() == n && sequence.a_y_mps2.len() == n;
+    // By the trapezoid: a plain mean of samples is off by more than a good sensor.
+    let integral = |v: &[f32]| {
+        let mut sum = vec![0.0; n];
+        for k in 1..n {
+            sum[k] = sum[k - 1] + 0.5 * f64::from(v[k] + v[k - 1]) * (time(k) - time(k - 1));
+        }
+        sum
+    };
+    let (ways, turns) = (integral(&sequence.v_x_mps), rates.map(integral));
+    let at = |integral: &[f64], t: f64| {
+        let k = sequence.time_s.partition_point(|&s| f64::from(s) <= t).clamp(1, n - 1);
+        let share = ((t - time(k - 1)) / (time(k) - time(k - 1))).clamp(0.0, 1.0);
+        integral[k - 1] + (integral[k] - integral[k - 1]) * share
+    };
     let next = |from: usize| {
         let t = poses.time_s[from];
         let to = from + poses.time_s[from..].partition_point(|&p| p < t + span_s - 1e-6);
@@ -69,30 +108,34 @@ fn rows(sequence: &StateSequence, poses: &Poses, span_s: f64) -> [Vec<Row>; 4] {
                 ..sequence.time_s.partition_point(|&t| f64::from(t) <= to_s)
         };
         let (from_s, to_s) = (poses.time_s[here], poses.time_s[b]);
-        let within = samples(from_s, to_s);
-        let count = within.len();
+        let count = samples(from_s, to_s).len();
         if (count as f64) < 0.5 * (to_s - from_s) * n as f64 / (time(n - 1) - time(0)).max(1e-3) || count < 2
         {
             continue;
         }
-        let mean = |v: &[f32], range: std::ops::Range<usize>| {
-            let count = range.len() as f64;
-            v[range].iter().map(|&v| f64::from(v)).sum::<f64>() / count
+        let mean = |integral: &[f64]| (at(integral, to_s) - at(integral, from_s)) / (to_s - from_s);
+        // What a sensor's lag, or a rest of the poses' delay, makes of it.
+        let change = |integral: &[f64]| {
+            let middle_s = 0.5 * (from_s + to_s);
+            at(integral, to_s) + at(integral, from_s) - 2.0 * at(integral, middle_s)
         };
         let turned = poses.yaw_rad[b] - poses.yaw_rad[here];
-        if let Some(rates) = rates {
+        if let Some(turns) = &turns {
             rows[1].push(Row {
                 by_pose: turned / (to_s - from_s),
-                beside: [mean(rates, within.clone()), 1.0, 0.0],
+                beside: [mean(turns), 1.0, change(turns), 0.0],
                 samples: count as f64,
             });
         }
         if has_speed {
             let (sin, cos) = (0.5 * (poses.yaw_rad[here] + poses.yaw_rad[b])).sin_cos();
             let along = (poses.x_m[b] - poses.x_m[here]) * cos + (poses.y_m[b] - poses.y_m[here]) * sin;
+            // The way is the arc, and poses give its chord.
+            let half = 0.5 * turned.abs();
+            let arc = if half > 1e-3 { half / half.sin() } else { 1.0 };
             rows[0].push(Row {
-                by_pose: along / (to_s - from_s),
-                beside: [mean(&sequence.v_x_mps, within), 1.0, 0.0],
+                by_pose: along * arc.clamp(1.0, 2.0) / (to_s - from_s),
+                beside: [mean(&ways), 1.0, change(&ways), 0.0],
                 samples: count as f64,
             });
         }
@@ -107,23 +150,20 @@ fn rows(sequence: &StateSequence, poses: &Poses, span_s: f64) -> [Vec<Row>; 4] {
             cos * change(&poses.y_m) - sin * change(&poses.x_m),
         );
         // The second difference of positions is the mean acceleration under a triangle.
-        let (mut weights, mut squares, mut force) = (0.0, 0.0, [0.0; 2]);
+        let (mut weights, mut squares, mut force, mut late) = (0.0, 0.0, [0.0; 2], [0.0; 2]);
         let rate = |k: usize| rates.map_or(0.0, |r| f64::from(r[k]));
         let (mut turning, mut turning2) = (0.0, 0.0);
         for k in samples(from_s, until_s) {
             let t = time(k);
             let weight =
                 if t < to_s { (t - from_s) / (to_s - from_s) } else { (until_s - t) / (until_s - to_s) };
-            // The heading between the poses, from the middle one's.
-            let heading = if t < to_s {
-                -turned * (1.0 - (t - from_s) / (to_s - from_s))
-            } else {
-                (poses.yaw_rad[c] - poses.yaw_rad[b]) * (t - to_s) / (until_s - to_s)
-            };
+            let heading = turns.as_ref().map_or(0.0, |turns| at(turns, t) - at(turns, to_s));
             let (sin, cos) = heading.sin_cos();
             let (a_x, a_y) = (f64::from(sequence.a_x_mps2[k]), f64::from(sequence.a_y_mps2[k]));
-            force[0] += weight * (cos * a_x - sin * a_y);
-            force[1] += weight * (sin * a_x + cos * a_y);
+            for (place, a) in [cos * a_x - sin * a_y, sin * a_x + cos * a_y].into_iter().enumerate() {
+                force[place] += weight * a;
+                late[place] += if t < to_s { -a } else { a };
+            }
             turning2 += weight * rate(k).powi(2);
             turning += if t < to_s { -rate(k) } else { rate(k) };
             weights += weight;
@@ -134,8 +174,16 @@ fn rows(sequence: &StateSequence, poses: &Poses, span_s: f64) -> [Vec<Row>; 4] {
         }
         // Scale, bias and the place of the unit are the filter's to find.
         let samples = weights * weights / squares;
-        rows[2].push(Row { by_pose: along, beside: [force[0] / weights, 1.0, turning2 / weights], samples });
-        rows[3].push(Row { by_pose: across, beside: [force[1] / weights, 1.0, turning], samples });
+        rows[2].push(Row {
+            by_pose: along,
+            beside: [force[0] / weights, 1.0, turning2 / weights, late[0] / weights],
+            samples,
+        });
+        rows[3].push(Row {
+            by_pose: across,
+            beside: [force[1] / weights, 1.0, turning, late[1] / weights],
+            samples,
+        });
     }
     rows
 }
@@ -148,7 +196,7 @@ fn left(rows: &[Row]) -> Option<(f64, f64)> {
     let mut kept: Vec<usize> = (0..rows.len()).collect();
     let mut size = f64::INFINITY;
     for _ in 0..3 {
-        let width = if rows.iter().all(|r| r.beside[2] == 0.0) { 2 } else { 3 };
+        let width = if rows.iter().all(|r| r.beside[3] == 0.0) { 3 } else { 4 };
         let a = DMatrix::from_fn(kept.len(), width, |i, j| rows[kept[i]].beside[j]);
         let y = DVector::from_fn(kept.len(), |i, _| rows[kept[i]].by_pose);
         let found = a.svd(true, true).solve(&y, 1e-9).ok()?;

@@ -234,7 +234,7 @@ impl Filter {
             if self.contradicting < JUMP_POSES {
                 return;
             }
-            self.begin_anew(x_m, y_m, self.s[PSI] + innovation[2]);
+            self.begin_anew(x_m, y_m, predicted[2] + innovation[2]);
             return;
         }
         self.contradicting = 0;
@@ -267,7 +267,9 @@ impl Filter {
         }
         self.agreeing = 0;
         self.jumps_s.extend(self.time_s);
-        let values = [x_m, y_m, yaw_rad];
+        // A late pose says where the car was.
+        let (late_s, moved) = (self.s[LATE], rate(&self.s));
+        let values = [x_m + late_s * moved[X], y_m + late_s * moved[Y], yaw_rad + late_s * moved[PSI]];
         let sigmas = [self.levels.position_m, self.levels.position_m, self.levels.heading_rad];
         for place in 0..3 {
             self.s[place] = values[place];

@@ -1,12 +1,13 @@
 //! How noisy each sensor is and how fast the motion changes, from the recording itself.
 
 use gripsight_signals::{Poses, StateSequence, yaw_rates};
+use serde::Serialize;
 
-use crate::coloured::beside_poses;
+use crate::coloured::with_coloured;
 use crate::state::Drive;
 
 /// Standard deviations of white noise, and strengths of what drives the motion.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Levels {
     /// Of each coordinate of a pose.
     pub position_m: f64,
@@ -70,14 +71,7 @@ impl Levels {
             arm_m: 0.3 * (typical / 5.0).clamp(0.5, 5.0),
             change: [change_a_x.clamp(1.0, 1e4), change_a_y.clamp(4.0, 1e4), change_alpha.clamp(4.0, 1e5)],
         };
-        let [v_x, r, a_x, a_y] = beside_poses(sequence, poses, &levels);
-        Self {
-            v_x_mps: levels.v_x_mps.max(v_x),
-            yaw_rate_radps: levels.yaw_rate_radps.max(r),
-            a_x_mps2: levels.a_x_mps2.max(a_x),
-            a_y_mps2: levels.a_y_mps2.max(a_y),
-            ..levels
-        }
+        if poses.time_s.is_empty() { levels } else { with_coloured(sequence, poses, levels) }
     }
 
     pub(crate) fn drive(&self) -> Drive {

@@ -12,6 +12,8 @@ use crate::state::{ARM, B_R, B_X, B_Y, LATE, Matrix, PSI, RATE, SCALE, TILT, V_X
 /// What the recording says of the motion at every sample.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Smoothed {
+    /// How noisy each sensor was taken to be.
+    pub levels: Levels,
     /// v_x, v_y and yaw rate with their covariance, one for each sample.
     pub motion: Vec<Motion>,
     /// How late the poses are, with its standard deviation; `None` where nothing tells (taken as zero).
@@ -111,6 +113,7 @@ pub fn smooth(sequence: &StateSequence) -> Result<Smoothed, StateError> {
         })
         .collect();
     Ok(Smoothed {
+        levels,
         motion,
         pose_delay_s: delay.map(|(delay_s, _)| (delay_s + of(LATE).0, of(LATE).1)),
         poses_used: !poses.time_s.is_empty(),

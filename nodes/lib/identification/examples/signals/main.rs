@@ -4,6 +4,7 @@
 //! signals no_v_y FROM TO DURATION_S      v_y measured, and estimated from poses of four kinds of localisation
 //! signals lies FROM TO DURATION_S        signals scaled, turned, in other units, or made by an observer, with poses and an inertial unit and without
 //! signals bags FOLDER...                 bag folders: v_y as recorded, and estimated from the poses recorded
+//! signals foreign FOLDER...              the bag folders of other plants with their true forces: v_y as recorded, and estimated as with no_v_y
 //! signals honest FROM TO DURATION_S      what the cross checks give on honest drives: the tolerances rest on it
 //! ```
 //!
@@ -23,7 +24,7 @@ use gripsight_identification::{Config, FrictionPrior, Outcome, PerAxle, Residual
 use gripsight_signals::StateSequence;
 use gripsight_vehicle::{MagicFormula, VehicleParameters};
 use lies::{LOCALISATIONS, lies, localised};
-use support::{Truth, floor, read, reference, truth_of};
+use support::{Truth, floor, read, read_with_truth, reference, truth_of};
 
 /// The seeds of the noise of poses are apart from those of drives.
 const POSE_SEED: u64 = 0x00b0_5e5e;
@@ -138,7 +139,7 @@ fn drawn(seed: u64, duration_s: f64) -> Result<Drive> {
 
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let Some((mode, rest)) = arguments.split_first() else { bail!("no_v_y, lies, bags or honest?") };
+    let Some((mode, rest)) = arguments.split_first() else { bail!("no_v_y, lies, bags, foreign or honest?") };
     if mode != "honest" {
         println!("{HEADER}");
     }
@@ -173,6 +174,21 @@ fn main() -> Result<()> {
                 let mut without = sequence.clone();
                 without.v_y_mps.fill(0.0);
                 println!("{}", row(&name, "without v_y", &without, &vehicle, None, None));
+            }
+        }
+        ("foreign", folders) => {
+            for folder in folders.iter().map(Path::new) {
+                let run = read_with_truth(folder, f64::INFINITY)?;
+                let curve = |t: &Truth| floor(t).map(|(curve, _)| curve);
+                let truth = PerAxle { front: curve(&run.truth.front)?, rear: curve(&run.truth.rear)? };
+                let row =
+                    |what, sequence: &_| row(&run.name, what, sequence, &run.vehicle, Some(&truth), None);
+                println!("{}", row("v_y measured", &run.sequence));
+                for (place, (what, localisation)) in LOCALISATIONS.into_iter().enumerate() {
+                    let mut sequence = localised(&run.sequence, localisation, place as u64 ^ POSE_SEED);
+                    sequence.v_y_mps.fill(0.0);
+                    println!("{}", row(what, &sequence));
+                }
             }
         }
         ("honest", [from, to, duration_s]) => {

@@ -44,6 +44,8 @@ pub(super) fn source(
 pub(super) fn sharper(sequence: &StateSequence, checks: &Checks) -> Option<Check> {
     /// The motion changes little within it.
     const STEP_S: f64 = 0.1;
+    /// Over which poses are held against speeds.
+    const SPAN_S: f64 = 0.5;
     let counted = is_dead_reckoning(sequence) || is_integral_of_twist(sequence);
     let turned = checks.of(Pair::YawRateAndHeading).map(|c| c.finding);
     let no_sense = matches!(turned, Some(Finding::Sign | Finding::Unit { .. }));
@@ -67,7 +69,10 @@ pub(super) fn sharper(sequence: &StateSequence, checks: &Checks) -> Option<Check
         from = to;
     }
     let variances = smoothed.motion.iter().map(|m| m.v_y_sigma_mps().powi(2));
-    let sigma_mps = (variances.sum::<f64>() / smoothed.motion.len().max(1) as f64).sqrt();
+    let mean = variances.sum::<f64>() / smoothed.motion.len().max(1) as f64;
+    // Poses that say the speed ahead no better than this over half a second do not say the one to the side any better.
+    let samples = (SPAN_S * sequence.len() as f64 / sequence.duration_s().max(SPAN_S)).max(1.0);
+    let sigma_mps = mean.sqrt().hypot(smoothed.levels.v_x_mps / samples.sqrt());
     Some(lateral_speed_check(&reported, &known, &turning, sigma_mps))
 }
 
