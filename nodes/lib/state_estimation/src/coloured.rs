@@ -23,47 +23,26 @@ struct Row {
     samples: f64,
 }
 
-/// The levels with what shows over tenths of a second.
-///
-/// Whose it is: where way and both accelerations ask for it alike, it is the localisation that wanders, and the least of what they ask for is its share, the
-/// heading's with it. The rest is the sensors'.
+/// The levels with what the sensors leave beside the poses over tenths of a second. A localisation that wanders is not told from sensors that do: their levels
+/// then say how well poses and sensors agree, and nothing is known better than that.
 pub(crate) fn with_coloured(sequence: &StateSequence, poses: &Poses, white: Levels) -> Levels {
     let mut all = white;
     for span_s in SPANS_S {
         let rows = rows(sequence, poses, span_s);
-        // How an error of one coordinate of one pose shows.
-        let shows = [
-            2_f64.sqrt() / span_s,
-            2_f64.sqrt() / span_s,
-            6_f64.sqrt() / (span_s * span_s),
-            6_f64.sqrt() / (span_s * span_s),
+        let noise = [
+            white.position_m * 2_f64.sqrt() / span_s,
+            white.heading_rad * 2_f64.sqrt() / span_s,
+            white.position_m * 6_f64.sqrt() / (span_s * span_s),
+            white.position_m * 6_f64.sqrt() / (span_s * span_s),
         ];
-        let [mut left_m, mut samples] = [[0.0_f64; 4]; 2];
-        let mut told = true;
-        for place in 0..4 {
-            let white = if place == 1 { white.heading_rad } else { white.position_m };
-            let Some((size, worth)) = left(&rows[place]) else {
-                told &= place == 1;
-                continue;
-            };
-            let own = (size / shows[place]).powi(2) - white * white;
-            left_m[place] = if size > BEYOND * white * shows[place] { own.max(0.0).sqrt() } else { 0.0 };
-            samples[place] = worth;
+        let levels = [&mut all.v_x_mps, &mut all.yaw_rate_radps, &mut all.a_x_mps2, &mut all.a_y_mps2];
+        for ((level, rows), noise) in levels.into_iter().zip(&rows).zip(noise) {
+            if let Some((left, samples)) = left(rows)
+                && left > BEYOND * noise
+            {
+                *level = level.max((left * left - noise * noise).sqrt() * samples.sqrt());
+            }
         }
-        let wanders_m = if told { left_m[0].min(left_m[2]).min(left_m[3]) } else { 0.0 };
-        let wanders_rad = if wanders_m > 0.0 { left_m[1] } else { 0.0 };
-        let per_s = poses.time_s.len() as f64
-            / (poses.time_s.last().copied().unwrap_or(1.0) - poses.time_s[0]).max(span_s);
-        let many = (per_s * span_s).max(1.0).sqrt();
-        all.position_m = all.position_m.max(white.position_m.hypot(wanders_m * many));
-        all.heading_rad = all.heading_rad.max(white.heading_rad.hypot(wanders_rad * many));
-        let rest = |place: usize, wanders: f64| {
-            (left_m[place].powi(2) - wanders * wanders).max(0.0).sqrt() * shows[place] * samples[place].sqrt()
-        };
-        all.v_x_mps = all.v_x_mps.max(rest(0, wanders_m));
-        all.yaw_rate_radps = all.yaw_rate_radps.max(rest(1, wanders_rad));
-        all.a_x_mps2 = all.a_x_mps2.max(rest(2, wanders_m));
-        all.a_y_mps2 = all.a_y_mps2.max(rest(3, wanders_m));
     }
     all
 }

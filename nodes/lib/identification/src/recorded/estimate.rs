@@ -121,7 +121,7 @@ pub(super) fn fill(
 /// outweigh all others.
 fn known_well(smoothed: &Smoothed) -> Vec<bool> {
     /// Usual standard deviations.
-    const WORSE: f64 = 3.0;
+    const WORSE: f64 = 4.0;
     let sigmas: Vec<f64> = smoothed.motion.iter().map(Motion::v_y_sigma_mps).collect();
     let usual = crate::data::median(&mut sigmas.clone()).unwrap_or(f64::INFINITY);
     sigmas.iter().map(|&sigma| sigma <= WORSE * usual).collect()
