@@ -8,7 +8,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use gripsight_bag::{ReadReport, Role, TopicMap, read_sequences};
-use gripsight_diagnosis::{Diagnosis, Earlier, ExtendedModelFile, Request, Verdict, diagnose};
+use gripsight_diagnosis::{Diagnosis, Earlier, ExtendedModelFile, Request, TirePosterior, Verdict, diagnose};
 use gripsight_identification::export::{read_tires, stamp_text};
 use gripsight_identification::vehicle_hash;
 use gripsight_model::EffectId;
@@ -51,6 +51,10 @@ pub(crate) struct DiagnoseArgs {
     /// The tires of the model: pacejka.yaml or <car>_pacejka.txt; trusted to a few percent.
     #[arg(long, value_name = "FILE", conflicts_with = "bag2")]
     pacejka: Option<PathBuf>,
+    /// The car's own tires with their uncertainty: posterior.json of an identification. On a drive that it was fitted on it is a place to start
+    /// from, on another a prior.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["bag2", "later", "pacejka", "extended_model", "simulator", "simulator_bag"])]
+    posterior: Option<PathBuf>,
     /// The model to start from: extended_model.yaml of an earlier diagnosis, its effects in place at their sizes; what is left is diagnosed.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["bag2", "pacejka"])]
     extended_model: Option<PathBuf>,
@@ -81,11 +85,11 @@ pub(crate) struct DiagnoseArgs {
 }
 
 fn effects() -> PossibleValuesParser {
-    PossibleValuesParser::new(EffectId::ALL.iter().map(|e| e.name()))
+    PossibleValuesParser::new(EffectId::candidates().map(EffectId::name))
 }
 
 fn names() -> String {
-    let effects: Vec<&str> = EffectId::ALL.iter().map(|e| e.name()).collect();
+    let effects: Vec<&str> = EffectId::candidates().map(EffectId::name).collect();
     format!("Effects: {}", effects.join(", "))
 }
 
@@ -134,6 +138,7 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     let topics = args.topics.as_deref().map(TopicMap::read).transpose()?.unwrap_or_default();
     let vehicle = vehicle(args.vehicle.as_deref())?;
     let tires = args.pacejka.as_deref().map(tires).transpose()?;
+    let posterior = args.posterior.as_deref().map(posterior).transpose()?;
     let model = args.extended_model.as_deref().map(extended_model).transpose()?;
     let usable = |path: &Path| -> anyhow::Result<_> {
         let (sequence, report) = read(path, &topics)?;
@@ -154,6 +159,7 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     };
     let alone = |sequence| Request {
         tires,
+        posterior: posterior.as_ref(),
         model: model.as_ref(),
         without: &args.without,
         only: &args.only,
@@ -264,6 +270,12 @@ pub(crate) fn vehicle(path: Option<&Path>) -> anyhow::Result<VehicleParameters> 
 pub(crate) fn tires(path: &Path) -> anyhow::Result<gripsight_vehicle::PacejkaParameters> {
     let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
     read_tires(&text).with_context(|| format!("cannot use {}", path.display()))
+}
+
+/// The car's own tires of a file.
+fn posterior(path: &Path) -> anyhow::Result<TirePosterior> {
+    let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    TirePosterior::from_json(&text).with_context(|| format!("cannot use {}", path.display()))
 }
 
 /// The extended model of a file.

@@ -117,7 +117,7 @@ fn every_file_is_written_and_the_exit_code_says_whether_to_use_them() {
         } else {
             ["pacejka.rejected.yaml", "f1tenth_pacejka.rejected.txt", "f1tenth_lookup_table.rejected.csv"]
         };
-        let mut expected = vec!["identification.json", "report.html", "timing.json"];
+        let mut expected = vec!["identification.json", "posterior.json", "report.html", "timing.json"];
         expected.extend(tire_files);
         // A prior with a say adds a set of its own.
         let provisional = [

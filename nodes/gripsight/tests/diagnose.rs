@@ -116,6 +116,9 @@ fn diagnose_and_identify_take_the_extended_model_again() {
         json(&folder.join(name).join("identification.json"))["signals"]["steering_delay_s"].as_f64().unwrap()
     };
     assert!(delay_s("plain") > 0.025 && delay_s("corrected").abs() < 0.01, "{} s left", delay_s("corrected"));
+    // The chain: the car's own tires from the identification cost the diagnosis no name.
+    run("diagnose laps.mcap --vehicle laps.vehicle.yaml --posterior plain/posterior.json --out chain");
+    assert_eq!(json(&folder.join("chain/gap.json"))["effects"][0]["name"], "steering_delay");
     let page = fs::read_to_string(folder.join("corrected/report.html")).unwrap();
     assert!(page.contains("taken out of the signals"));
 

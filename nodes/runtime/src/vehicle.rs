@@ -13,6 +13,7 @@ pub fn vehicle_parameters(node: &mut Node) -> Result<VehicleParameters, Error> {
         node.parameter(&format!("vehicle.{name}"), default, Descriptor::new(meaning).read_only())
             .map(|p| p.get())
     };
+    const NOT_STATED: f64 = -1.0;
     let known = VehicleParameters::f1tenth();
     let vehicle = VehicleParameters {
         mass_kg: number("mass_kg", 0.0, "Mass [kg]; required")?,
@@ -20,16 +21,18 @@ pub fn vehicle_parameters(node: &mut Node) -> Result<VehicleParameters, Error> {
         l_f_m: number("l_f_m", 0.0, "Centre of gravity to front axle [m]; required")?,
         l_r_m: number("l_r_m", 0.0, "Centre of gravity to rear axle [m]; required")?,
         h_cg_m: number("h_cg_m", 0.0, "Height of the centre of gravity [m]")?,
-        drive_front_share: number(
+        drive_front_share: Some(number(
             "drive_front_share",
-            known.drive_front_share,
-            "Share of the drive force at the front axle [-]",
-        )?,
-        brake_front_share: number(
+            NOT_STATED,
+            "Share of the drive force at the front axle [-]; negative: not known",
+        )?)
+        .filter(|&share| share >= 0.0),
+        brake_front_share: Some(number(
             "brake_front_share",
-            known.brake_front_share,
-            "Share of the brake force at the front axle [-]",
-        )?,
+            NOT_STATED,
+            "Share of the brake force at the front axle [-]; negative: not known",
+        )?)
+        .filter(|&share| share >= 0.0),
         max_steering_rad: number(
             "max_steering_rad",
             known.max_steering_rad,

@@ -1,5 +1,6 @@
 //! `gripsight identify`: a bag in, tires out.
 
+mod posterior;
 mod previous;
 mod progress;
 mod summary;
@@ -37,6 +38,7 @@ use windows::Windows;
 /// DIR receives identification.json, report.html, timing.json and the files that other stacks read: pacejka.yaml (MPC),
 /// <car>_pacejka.txt and <car>_lookup_table.csv (steering-lookup controllers). They promise no force beyond what the drive has
 /// shown, and say up to which slips and forces they are valid (status accepted, or accepted_within where the peak was not reached).
+/// posterior.json holds the car's own tires with their uncertainty, for `diagnose --posterior`.
 /// Where the result is rejected, those three are named *.rejected.* instead, what lies there already stays as it is, and the
 /// exit code is 3. A friction prior never replaces what the data show: it adds a second set, *.provisional.*.
 ///
@@ -245,7 +247,12 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
         }
         last = Some((result, files));
     }
+    let before = start.elapsed().as_secs_f64();
+    if let (Some((result, files)), Some(sequence)) = (&mut last, sequences.last()) {
+        files.extend(posterior::write(&args.out, &vehicle, sequence, result)?);
+    }
     timing.total_s = start.elapsed().as_secs_f64();
+    timing.posterior_s = timing.total_s - before;
     let Some((result, mut files)) = last else { bail!("{}: no state sequence", args.bag().display()) };
     if sequences.len() > 1 {
         files.push(windows.write(&args.out)?);

@@ -23,6 +23,8 @@ pub(super) struct Timing {
     pub(super) sweep_s: f64,
     /// The fits to them and the final judgement.
     pub(super) fit_s: f64,
+    /// Fitting the car's own tires, for a diagnosis to start from.
+    pub(super) posterior_s: f64,
     /// Writing the files, lookup table and report included.
     pub(super) writing_s: f64,
 }

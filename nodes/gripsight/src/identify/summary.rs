@@ -57,7 +57,7 @@ pub(super) fn summary(car: &str, result: &Outcome, files: &[PathBuf], timing: &T
     }
     let _ = writeln!(
         text,
-        "{:.2} s: reading {:.2}, camera {:.2}, signals and direct fit {:.2}, training {:.2}, sweep {:.2}, fit {:.2}, files {:.2}",
+        "{:.2} s: reading {:.2}, camera {:.2}, signals and direct fit {:.2}, training {:.2}, sweep {:.2}, fit {:.2}, own tires {:.2}, files {:.2}",
         timing.total_s,
         timing.reading_s,
         timing.camera_s,
@@ -65,6 +65,7 @@ pub(super) fn summary(car: &str, result: &Outcome, files: &[PathBuf], timing: &T
         timing.training_s,
         timing.sweep_s,
         timing.fit_s,
+        timing.posterior_s,
         timing.writing_s
     );
     text

@@ -47,7 +47,7 @@ fn case(length_s: f64, candidates: usize, effects: &[&str]) -> anyhow::Result<()
     let car = CarParameters::by_name("f1tenth")?;
     let vehicle = nominal(&car);
     let recording = drive(&car, effects, length_s, 31)?;
-    let only: Vec<String> = EffectId::ALL.iter().take(candidates).map(|e| e.name().to_owned()).collect();
+    let only: Vec<String> = EffectId::candidates().take(candidates).map(|e| e.name().to_owned()).collect();
     let request = Request { only: &only, ..Request::new(&recording, &vehicle) };
     let mut times_s = Vec::new();
     let mut verdict = "";
@@ -72,7 +72,7 @@ fn case(length_s: f64, candidates: usize, effects: &[&str]) -> anyhow::Result<()
 
 fn all(folder: &Path) -> anyhow::Result<()> {
     fs::create_dir_all(folder)?;
-    let all = EffectId::ALL.len();
+    let all = EffectId::candidates().count();
     let lengths = LENGTHS_S.map(|length_s| ("length", length_s, length_s, all, ONE));
     let candidates = CANDIDATES.map(|count| ("candidates", count as f64, LENGTH_S, count, ONE));
     let several =

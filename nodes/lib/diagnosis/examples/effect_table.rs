@@ -48,7 +48,8 @@ fn main() -> anyhow::Result<()> {
         }
     }
     let out = out.context("--out FOLDER is needed")?;
-    let order: Vec<&str> = std::iter::once("none").chain(EffectId::ALL.iter().map(|e| e.name())).collect();
+    let order: Vec<&str> =
+        std::iter::once("none").chain(EffectId::candidates().map(EffectId::name)).collect();
     if names.is_empty() {
         names = order.iter().map(|n| (*n).to_owned()).collect();
     }

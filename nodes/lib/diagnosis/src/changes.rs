@@ -8,7 +8,7 @@
 //! cost(theta, delta) = cost_earlier(theta) / phi_earlier + cost_later(theta + delta) / phi_later
 //! ```
 
-use gripsight_estimation::selection::{ColumnPrior, Quadratic, Selection, Term, select};
+use gripsight_estimation::selection::{ColumnPrior, Quadratic, Selection, Term, configuration, select};
 use gripsight_model::{BASE, EffectId, Site, TIRES, tires_to_parameters};
 use nalgebra::{DMatrix, DVector};
 
@@ -60,8 +60,43 @@ pub(crate) fn compare(engine: &Engine<'_>, earlier: &Inferred, later: &Inferred)
     terms.extend(differences(engine, earlier));
     let mut start = earlier.selection.best.clone();
     start.resize(terms.len(), 0);
-    let selection = select(&problem, 1.0, &terms, &start, 23)?;
+    let mut selection = select(&problem, 1.0, &terms, &start, 23)?;
+    // A difference that no effect does is worth a word only where it closes as much as free terms must in a drive by itself.
+    while let Some(needless) = needless(&problem, &terms, &selection.best, earlier, later) {
+        for t in needless {
+            terms[t] = terms[t].only(0);
+        }
+        let start: Vec<usize> =
+            selection.best.iter().zip(&terms).map(|(a, t)| (*a).min(t.log_weights.len() - 1)).collect();
+        selection = select(&problem, 1.0, &terms, &start, 23)?;
+    }
     Some(Compared { selection, columns: n, terms: earlier.terms.len() })
+}
+
+/// The free terms of a site's difference that close too little of the later drive's error, those that close least first.
+fn needless(
+    problem: &Quadratic,
+    terms: &[Term],
+    best: &[usize],
+    earlier: &Inferred,
+    later: &Inferred,
+) -> Option<std::ops::Range<usize>> {
+    let cost = |chosen: &[usize]| {
+        let step = configuration(problem, 1.0, terms, chosen)?.step;
+        Some(2.0 * problem.gradient.dot(&step) + (&problem.information * &step).dot(&step))
+    };
+    let whole = cost(best)?;
+    let all = later.weighed.cost / later.dispersion;
+    let of = |site: Site| {
+        let of_site = earlier.terms_of_site(site);
+        let differences = of_site.start + earlier.terms.len()..of_site.end + earlier.terms.len();
+        let mut without = best.to_vec();
+        without[differences.clone()].fill(0);
+        let closes = (cost(&without).filter(|_| without != best)? - whole) / all;
+        (closes < decisions::LEAST_CLOSED).then_some((differences, closes))
+    };
+    let least = Site::ALL.into_iter().filter_map(of).min_by(|a, b| a.1.total_cmp(&b.1));
+    least.map(|(differences, _)| differences)
 }
 
 /// The differences as terms: nothing to speak of, or a change.
@@ -95,10 +130,12 @@ fn differences(engine: &Engine<'_>, earlier: &Inferred) -> Vec<Term> {
             let size = engine.size(spec);
             let (same, wide) = (SAME * size, decisions::WIDE * size);
             let same = if i < effect.sizing() { same } else { wide };
+            // What the later drive has is a size that the effect can have: no lag goes back by more than there is of it.
+            let before = earlier.values[range.start + i];
             ColumnPrior {
                 offset: 0.0,
                 sigma: if open { vec![same, wide] } else { vec![same] },
-                bounds: unbounded,
+                bounds: spec.range.map(|r| spec.null + r * size - before),
             }
         };
         let priors = effect.spec().parameters.iter().enumerate().map(prior).collect();

@@ -7,14 +7,15 @@ use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 
 use crate::budget::{Budget, CANDIDATES, Models, Scorer, large_slip_rad};
 use crate::engine::Engine;
+use crate::figures::figures;
 use crate::finding::{detection_limits, ranked, sites};
 use crate::infer::{Inferred, infer, linearised};
 use crate::outcome::{Diagnosis, Inference, Invisible, TirePair};
 use crate::state::State;
 use crate::trust::TireTrust;
 use crate::usable::{Usable, cannot_tell, refused, usable};
-use crate::verdict::{decide, drive_next, figures, record_next};
-use crate::{Earlier, ExtendedModelFile, GapError, noise, pictures, place, plausible};
+use crate::verdict::{decide, drive_next, errors, record_next};
+use crate::{Earlier, ExtendedModelFile, GapError, TirePosterior, noise, pictures, place, plausible};
 
 /// What is diagnosed, and with what.
 #[derive(Debug, Clone)]
@@ -29,6 +30,8 @@ pub struct Request<'a> {
     pub vehicle: &'a VehicleParameters,
     /// The tires as the model has them, and trusted to a few percent; `None`: identified from the training blocks.
     pub tires: Option<PacejkaParameters>,
+    /// The car's own tires from another drive, or from this one, where they are but a place to start from; in place of `tires`.
+    pub posterior: Option<&'a TirePosterior>,
     /// The model to start from, in place of `tires`: an earlier diagnosis, its effects in place at their sizes.
     pub model: Option<&'a ExtendedModelFile>,
     /// Names of effects to leave out of the library.
@@ -47,6 +50,7 @@ impl<'a> Request<'a> {
             earlier: None,
             vehicle,
             tires: None,
+            posterior: None,
             model: None,
             without: &[],
             only: &[],
@@ -71,7 +75,7 @@ const GENERIC: [[f64; 8]; 3] = [
     [14.0, 1.5, 1.7, 0.0, 18.0, 1.5, 1.7, 0.0],
 ];
 /// Windows that the inference works on, at most.
-const SEARCH_WINDOWS: usize = 70;
+pub(crate) const SEARCH_WINDOWS: usize = 70;
 /// How often a later drive is linearised to be compared with an earlier one.
 const COMPARISONS: usize = 2;
 /// Iterations of the fits on all training blocks.
@@ -104,15 +108,19 @@ pub(crate) fn explain(
         return Err(GapError::Earlier("the two drives do not record the same signals".to_owned()));
     }
     progress("fitting the tires");
-    let (tires, trust) = match request.given_tires() {
-        Some(tires) if request.earlier.is_some() => (tires, TireTrust::drive()),
-        Some(tires) => (tires, TireTrust::file()),
-        None => (fit_tires(&recording, request.vehicle, &windows.training)?, TireTrust::free()),
+    let (tires, trust) = match (request.posterior, request.given_tires()) {
+        (Some(posterior), _) if posterior.is_of(request.sequence) => (posterior.tires()?, TireTrust::free()),
+        (Some(posterior), _) => (posterior.tires()?, posterior.trust()?),
+        (None, Some(tires)) if request.earlier.is_some() => (tires, TireTrust::drive()),
+        (None, Some(tires)) => (tires, TireTrust::file()),
+        (None, None) => (fit_tires(&recording, request.vehicle, &windows.training)?, TireTrust::free()),
     };
     let (library, invisible) = library(request, &recording, trust != TireTrust::free())?;
     let mut engine = Engine::new(&recording, request.vehicle, tires, trust);
     if let Some(model) = request.given_model() {
         (engine.held, engine.usual) = model.parameters()?;
+    } else if let Some(posterior) = request.posterior {
+        engine.usual = posterior.usual()?;
     }
     let nominal = engine.nominal_model();
     // The inference works on a bounded number of windows, the final fit on all.
@@ -175,7 +183,7 @@ pub(crate) fn explain(
     let models = Models { nominal: &nominal, null: &null, state: &model, candidates: &candidates };
     let budget = Budget::of(&engine, &scorer, &windows, &models);
     let (verdict, mut reasons) = match &differences {
-        Some((_, differences)) => (differences.verdict(), figures(&budget, named.is_empty())),
+        Some((_, differences)) => (differences.verdict(), errors(&budget, named.is_empty())),
         None => decide(&budget, &inferred, &library),
     };
     // What cannot be right comes right after the errors: it explains more than any effect.
@@ -199,7 +207,8 @@ pub(crate) fn explain(
         effects,
         changes: differences.map(|(_, d)| d.changes).unwrap_or_default(),
         invisible,
-        detection_limits: detection_limits(&inferred),
+        detection_limits: detection_limits(&engine, &inferred),
+        figures: figures(&engine, &inferred),
         places: place::places(&engine, &nominal, &on_all, &nominal_score),
         identities: recording.identities.clone(),
         gap: budget.stated(&recording),
@@ -214,7 +223,7 @@ pub(crate) fn explain(
 }
 
 /// Tires and background fitted, nothing else.
-fn fitted_null(engine: &Engine<'_>, windows: &Windows) -> Result<State, GapError> {
+pub(crate) fn fitted_null(engine: &Engine<'_>, windows: &Windows) -> Result<State, GapError> {
     const ITERATIONS: usize = 30;
     let null = engine.fit(&[], &engine.blank(), None, windows, ITERATIONS);
     if null.finite { Ok(null) } else { Err(GapError::NotFinite) }
@@ -275,7 +284,7 @@ pub(crate) fn library(
     };
     let mut library = Vec::new();
     let mut invisible = Vec::new();
-    for &effect in EffectId::ALL {
+    for effect in EffectId::candidates() {
         if without.contains(&effect) || (!only.is_empty() && !only.contains(&effect)) {
             continue;
         }

@@ -13,7 +13,7 @@ use crate::decisions;
 use crate::engine::Engine;
 use crate::infer::Inferred;
 use crate::outcome::{DetectionLimit, RankedEffect};
-use crate::sizes::reported;
+use crate::sizes::{reported, with_half_widths};
 
 /// Probability of one effect, where another one is absent, from which it may stand in its place.
 const IN_ITS_PLACE: f64 = 0.2;
@@ -67,7 +67,7 @@ pub(crate) fn ranked(
 }
 
 /// Sizes from which effects would show beside the most probable model: five standard deviations.
-pub(crate) fn detection_limits(inferred: &Inferred) -> Vec<DetectionLimit> {
+pub(crate) fn detection_limits(engine: &Engine<'_>, inferred: &Inferred) -> Vec<DetectionLimit> {
     const STANDARD_DEVIATIONS: f64 = 5.0;
     let problem = &inferred.weighed.total;
     let of = |&effect: &EffectId| {
@@ -77,10 +77,20 @@ pub(crate) fn detection_limits(inferred: &Inferred) -> Vec<DetectionLimit> {
         let covariance = configuration(problem, inferred.dispersion, &inferred.terms, &chosen)?.covariance;
         let from = inferred.terms[term].from;
         let parameters = effect.spec().parameters.iter().take(effect.sizing()).enumerate();
-        let limit = |(i, p): (usize, &gripsight_model::ParameterSpec)| DetectionLimit {
-            name: effect.name(),
-            parameter: p.name,
-            size: STANDARD_DEVIATIONS * covariance[(from + i, from + i)].max(0.0).sqrt(),
+        let sized = inferred.sizes.effect(&inferred.columns, effect);
+        let found = sized.as_ref().map(|sized| with_half_widths(engine, effect, sized));
+        let limit = |(i, p): (usize, &gripsight_model::ParameterSpec)| {
+            let (value, half) = found.as_ref().map_or((f64::NAN, f64::NAN), |f| f[i]);
+            DetectionLimit {
+                name: effect.name(),
+                parameter: p.name,
+                size: STANDARD_DEVIATIONS * covariance[(from + i, from + i)].max(0.0).sqrt(),
+                matters: engine.size(p),
+                value,
+                low: value - half,
+                high: value + half,
+                standard_error: sized.as_ref().map_or(f64::NAN, |(_, sigma)| sigma[i]),
+            }
         };
         Some(parameters.map(limit).collect::<Vec<_>>())
     };

@@ -59,13 +59,11 @@ pub(crate) fn terms(
                     wide
                 } else {
                     let usual = engine.usual(effect).unwrap_or(decisions::USUAL_SHARE * size);
-                    // What no fit can know of a size is nobody's fault either.
+                    // What no fit can know of a size, and what looks like the effect in any car, is nobody's fault either.
                     let recording = engine.recording;
-                    usual.hypot(effect.spec().unknown.sigma(
-                        0.0,
-                        recording.dt_s(),
-                        recording.typical_speed_mps(),
-                    ))
+                    let unknown = effect.spec().unknown;
+                    let unknown = unknown.sigma(0.0, recording.dt_s(), recording.typical_speed_mps());
+                    usual.hypot(unknown).hypot(effect.spec().spread * size)
                 };
                 ColumnPrior {
                     offset: absent[i] - value,

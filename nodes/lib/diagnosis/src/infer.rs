@@ -211,7 +211,7 @@ pub(crate) fn linearised(
                 .iter()
                 .map(|p| if p.len() > 1 { p[p.len() - 1] } else { 1.0 })
                 .collect();
-            let sizes = Sizes { sigma: vec![f64::NAN; values.len()], values: values.clone() };
+            let sizes = Sizes::unknown(values.clone());
             return Some(Inferred {
                 chosen: selection.best.clone(),
                 stated: None,
@@ -245,7 +245,7 @@ pub(crate) fn linearised(
 }
 
 /// What even all terms together leave of each channel counts as noise: by how much more than the weights have it, which are raised.
-fn noise_scale(
+pub(crate) fn noise_scale(
     engine: &mut Engine<'_>,
     joint: &Joint,
     base: &[f64],
@@ -346,7 +346,7 @@ impl Inferred {
 }
 
 /// How much larger the scatter of the blocks' gradients is than that of independent errors, at the best model with all terms open.
-fn repeated(weighed: &Weighed, terms: &[Term], open: &[usize]) -> Option<f64> {
+pub(crate) fn repeated(weighed: &Weighed, terms: &[Term], open: &[usize]) -> Option<f64> {
     let Configuration { step, covariance, .. } = configuration(&weighed.total, 1.0, terms, open)?;
     // Directions that the data know: H C is the share of the data in each.
     let known: f64 = (&weighed.total.information * &covariance).trace();

@@ -31,6 +31,7 @@ mod earlier;
 mod engine;
 mod error;
 mod extended_file;
+mod figures;
 mod finding;
 mod hypotheses;
 mod infer;
@@ -41,6 +42,7 @@ mod patch;
 mod pictures;
 mod place;
 mod plausible;
+mod posterior;
 mod priors;
 mod residual;
 mod sizes;
@@ -58,8 +60,10 @@ pub use diagnose::{Request, diagnose};
 pub use earlier::Earlier;
 pub use error::GapError;
 pub use extended_file::ExtendedModelFile;
+pub use figures::FigureAnswer;
 pub use outcome::{
     DetectionLimit, Diagnosis, EffectParameter, GapBudget, GapStep, Inference, Invisible, Place, Prediction,
     RankedEffect, Series, TirePair, Verdict, Where,
 };
+pub use posterior::{PosteriorParameter, TirePosterior, own_tires};
 pub use trust::TireTrust;

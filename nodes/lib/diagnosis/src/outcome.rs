@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use crate::ExtendedModelFile;
 use crate::answer::{Change, SiteAnswer};
+use crate::figures::FigureAnswer;
 
 /// What a diagnosis comes to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -106,6 +107,16 @@ pub struct DetectionLimit {
     pub parameter: &'static str,
     /// Five standard errors.
     pub size: f64,
+    /// A size that matters on this car.
+    pub matters: f64,
+    /// What the data say of it beside the model that is stated, with its 90 % interval; unknown (`null`) where its derivative vanishes there.
+    pub value: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Standard error of the value: the data's alone.
+    pub standard_error: f64,
 }
 
 /// A part of the data with its errors.
@@ -254,6 +265,8 @@ pub struct Diagnosis {
     pub invisible: Vec<Invisible>,
     /// Sizes from which effects would show.
     pub detection_limits: Vec<DetectionLimit>,
+    /// The figures that are stated of the car, with what the data say of them.
+    pub figures: Vec<FigureAnswer>,
     /// Where the gap lies.
     #[serde(rename = "where")]
     pub places: Where,

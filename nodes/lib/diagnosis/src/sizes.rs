@@ -11,7 +11,8 @@ use crate::around::{Around, Refined};
 use crate::decisions;
 use crate::engine::Engine;
 use crate::hypotheses::terms;
-use crate::joint::{Columns, Joint};
+use crate::infer::FIRST;
+use crate::joint::{Columns, Joint, Weighed};
 use crate::outcome::EffectParameter;
 
 /// Half width of a 90 % interval in standard deviations.
@@ -22,14 +23,20 @@ pub(crate) const NINETY: f64 = 1.645;
 pub(crate) struct Sizes {
     pub(crate) values: Vec<f64>,
     pub(crate) sigma: Vec<f64>,
+    /// Open effects that the model lacks, each as it would be if it alone were added.
+    pub(crate) added: Vec<(EffectId, Sized)>,
 }
 
 /// Parameters of an effect with their standard deviations.
 pub(crate) type Sized = (Vec<f64>, Vec<f64>);
 
 impl Sizes {
-    /// Linearises around a fitted configuration, and takes one more step there. Standard deviations are the larger of those of the posterior and
-    /// of a sandwich with blocks as clusters (errors that are alike within a block), which has a t distribution over so few blocks.
+    /// Values of which nothing is known.
+    pub(crate) fn unknown(values: Vec<f64>) -> Self {
+        Self { sigma: vec![f64::NAN; values.len()], values, added: Vec::new() }
+    }
+
+    /// Linearises around a fitted configuration, and takes one more step there.
     pub(crate) fn of(
         around: &Around<'_, '_>,
         library: &[EffectId],
@@ -41,42 +48,88 @@ impl Sizes {
         let joint = Joint::around(engine, columns, &fitted.values, &fitted.starts, windows)?;
         let weighed = joint.weighed(&vec![1.0; engine.sigma.len()]);
         let terms = terms(engine, columns, &fitted.values, library);
-        let active = active(around, &terms, chosen);
-        let n = active.len();
-        let phi = around.dispersion;
-        let prior = DVector::from_iterator(n, active.iter().map(|a| a.precision));
-        let info = |q: &Quadratic| {
-            DMatrix::from_fn(n, n, |r, c| q.information[(active[r].column, active[c].column)])
+        let mut out = Self::unknown(fitted.values.clone());
+        let own = active(around, &terms, chosen);
+        let Stepped { step, sigma, .. } = stepped(&weighed, around.dispersion, &own)?;
+        for (i, a) in own.iter().enumerate() {
+            out.values[a.column] += step[i];
+            out.sigma[a.column] = sigma[i];
+        }
+        let lacking = |(i, effect): (usize, &EffectId)| {
+            let (term, range) = (FIRST + i, columns.of_effect(*effect)?);
+            let seen = range.clone().all(|c| weighed.total.information[(c, c)] > 0.0);
+            if chosen[term] > 0 || terms[term].log_weights.len() == 1 || !seen {
+                return None;
+            }
+            let mut fuller = chosen.to_vec();
+            fuller[term] = 1;
+            let all = active(around, &terms, &fuller);
+            let Stepped { step, sigma, .. } = stepped(&weighed, around.dispersion, &all)?;
+            let own = all.iter().enumerate().filter(|(_, a)| range.contains(&a.column));
+            Some((*effect, own.map(|(i, a)| (fitted.values[a.column] + step[i], sigma[i])).unzip()))
         };
-        let slope = |q: &Quadratic| DVector::from_iterator(n, active.iter().map(|a| q.gradient[a.column]));
-        let precision = info(&weighed.total) / phi + DMatrix::from_diagonal(&prior);
-        let inverse = precision.cholesky()?.inverse();
-        let pull = DVector::from_fn(n, |i, _| prior[i] * active[i].offset) - slope(&weighed.total) / phi;
-        let step = &inverse * pull;
-        let mut scatter = DMatrix::from_diagonal(&prior);
-        let blocks = weighed.blocks.len() as f64;
-        let few = blocks / (blocks - 1.0).max(1.0) / (phi * phi);
-        for block in &weighed.blocks {
-            let score = slope(block) + info(block) * &step;
-            scatter += &score * score.transpose() * few;
-        }
-        let sandwich = &inverse * scatter * &inverse;
-        let wider = ninety_of_t(blocks - 1.0) / NINETY;
-        let mut out = Self { values: fitted.values.clone(), sigma: vec![f64::NAN; columns.len()] };
-        for (i, a) in active.iter().enumerate() {
-            out.values[a.column] += step[i].clamp(a.bounds[0], a.bounds[1]);
-            out.sigma[a.column] =
-                inverse[(i, i)].max(0.0).sqrt().max(wider * sandwich[(i, i)].max(0.0).sqrt());
-        }
+        out.added = columns.effects.iter().enumerate().filter_map(lacking).collect();
         out.values.iter().all(|v| v.is_finite()).then_some(out)
     }
 
-    /// Parameters of an effect; `None` where the model does not have it.
+    /// Parameters of an effect; `None` where it could not be added to the model.
     pub(crate) fn effect(&self, columns: &Columns, effect: EffectId) -> Option<Sized> {
         let range = columns.of_effect(effect)?;
         let sigma = self.sigma.get(range.clone())?.to_vec();
-        sigma.iter().all(|s| s.is_finite()).then(|| (self.values[range].to_vec(), sigma))
+        let own = sigma.iter().all(|s| s.is_finite()).then(|| (self.values[range].to_vec(), sigma));
+        own.or_else(|| self.added.iter().find(|(e, _)| *e == effect).map(|(_, sized)| sized.clone()))
     }
+}
+
+/// Covariance of some columns of the model without any effect, as [`Sizes`] has their standard deviations, row after row.
+pub(crate) fn own_covariance(
+    around: &Around<'_, '_>,
+    weighed: &Weighed,
+    columns: &[usize],
+) -> Option<Vec<Vec<f64>>> {
+    let active = active(around, around.terms, &vec![0; around.terms.len()]);
+    let Stepped { inverse, sigma, .. } = stepped(weighed, around.dispersion, &active)?;
+    let places = columns.iter().map(|c| active.iter().position(|a| a.column == *c));
+    let places: Vec<usize> = places.collect::<Option<_>>()?;
+    // Correlations are the posterior's.
+    let wider = |i: usize| sigma[i] / inverse[(i, i)].sqrt();
+    let row = |&i: &usize| places.iter().map(|&j| inverse[(i, j)] * wider(i) * wider(j)).collect();
+    Some(places.iter().map(row).collect())
+}
+
+/// Where the columns of a configuration go by one step.
+struct Stepped {
+    step: DVector<f64>,
+    /// Posterior covariance.
+    inverse: DMatrix<f64>,
+    sigma: Vec<f64>,
+}
+
+/// The step of a configuration's columns, with their standard deviations: the larger of those of the posterior and of a
+/// sandwich with blocks as clusters (errors that are alike within a block), which has a t distribution over so few blocks.
+fn stepped(weighed: &Weighed, phi: f64, active: &[Active]) -> Option<Stepped> {
+    let n = active.len();
+    let prior = DVector::from_iterator(n, active.iter().map(|a| a.precision));
+    let info =
+        |q: &Quadratic| DMatrix::from_fn(n, n, |r, c| q.information[(active[r].column, active[c].column)]);
+    let slope = |q: &Quadratic| DVector::from_iterator(n, active.iter().map(|a| q.gradient[a.column]));
+    let precision = info(&weighed.total) / phi + DMatrix::from_diagonal(&prior);
+    let inverse = precision.cholesky()?.inverse();
+    let pull = DVector::from_fn(n, |i, _| prior[i] * active[i].offset) - slope(&weighed.total) / phi;
+    let mut step = &inverse * pull;
+    let mut scatter = DMatrix::from_diagonal(&prior);
+    let blocks = weighed.blocks.len() as f64;
+    let few = blocks / (blocks - 1.0).max(1.0) / (phi * phi);
+    for block in &weighed.blocks {
+        let score = slope(block) + info(block) * &step;
+        scatter += &score * score.transpose() * few;
+    }
+    let sandwich = &inverse * scatter * &inverse;
+    let wider = ninety_of_t(blocks - 1.0) / NINETY;
+    let sigma = |i: usize| inverse[(i, i)].max(0.0).sqrt().max(wider * sandwich[(i, i)].max(0.0).sqrt());
+    let sigma = (0..n).map(sigma).collect();
+    step.iter_mut().zip(active).for_each(|(s, a)| *s = s.clamp(a.bounds[0], a.bounds[1]));
+    Some(Stepped { step, inverse, sigma })
 }
 
 /// A column that the model has.
@@ -110,7 +163,13 @@ fn ninety_of_t(degrees: f64) -> f64 {
     TABLE.get(place).copied().unwrap_or(NINETY + 0.167 * 10.0 / degrees)
 }
 
-/// Half widths of the 90 % intervals of an effect's parameters: what the fit knows, what no fit can know, and errors of the model that all data share.
+/// An effect's parameters, each with the half width of its interval.
+pub(crate) fn with_half_widths(engine: &Engine<'_>, effect: EffectId, sized: &Sized) -> Vec<(f64, f64)> {
+    sized.0.iter().copied().zip(half_widths(engine, effect, sized)).collect()
+}
+
+/// Half widths of the 90 % intervals of an effect's parameters: what the fit knows, what no fit can know, errors of the model that all data share, and
+/// what is found in cars without the effect.
 fn half_widths(engine: &Engine<'_>, effect: EffectId, (own, sigma): &Sized) -> Vec<f64> {
     let spec = effect.spec();
     let recording = engine.recording;
@@ -118,7 +177,8 @@ fn half_widths(engine: &Engine<'_>, effect: EffectId, (own, sigma): &Sized) -> V
         let size = v - p.null;
         let shared = decisions::SHARED_ERROR * size.hypot(engine.size(p));
         let unknown = spec.unknown.sigma(size, recording.dt_s(), recording.typical_speed_mps());
-        NINETY * s.hypot(shared).hypot(unknown)
+        let spread = if spec.usual.is_none() { spec.spread * engine.size(p) } else { 0.0 };
+        NINETY * s.hypot(shared).hypot(unknown).hypot(spread)
     };
     own.iter().zip(sigma).zip(spec.parameters).map(half).collect()
 }
@@ -126,7 +186,12 @@ fn half_widths(engine: &Engine<'_>, effect: EffectId, (own, sigma): &Sized) -> V
 /// How many half widths of its interval an effect's size is away from what it is where it is absent: of the parameters that size it the largest.
 pub(crate) fn told(engine: &Engine<'_>, effect: EffectId, sized: &Sized) -> f64 {
     let absent = engine.absent(effect);
-    let away = |(i, half): (usize, &f64)| (sized.0[i] - absent[i]).abs() / half;
+    let spec = effect.spec();
+    // Of what every car has a little of, that little is as good as nothing; its size it is all the same.
+    let usual = if spec.usual.is_some() { NINETY * spec.spread } else { 0.0 };
+    let away = |(i, half): (usize, &f64)| {
+        (sized.0[i] - absent[i]).abs() / half.hypot(usual * engine.size(&spec.parameters[i]))
+    };
     half_widths(engine, effect, sized).iter().enumerate().take(effect.sizing()).map(away).fold(0.0, f64::max)
 }
 
@@ -165,4 +230,27 @@ pub(crate) fn reported(
             (r.name, EffectParameter { value, low, high, unit: r.unit, before: given.map(r.value) })
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_spread_of_each_effect_is_that_of_the_development_cases() {
+        let path =
+            concat!(env!("CARGO_MANIFEST_DIR"), "/../../../tests/results/withheld/development_spread.csv");
+        let table = std::fs::read_to_string(path).unwrap();
+        let mut largest = BTreeMap::<&str, f64>::new();
+        for line in table.lines().skip(1) {
+            let cells: Vec<&str> = line.split(',').collect();
+            let spread = largest.entry(cells[0]).or_default();
+            *spread = spread.max(cells[4].parse().unwrap());
+        }
+        assert!(largest.len() > 30, "{}", largest.len());
+        for effect in EffectId::candidates() {
+            let of_table = largest.get(effect.name()).copied().unwrap_or(0.0);
+            assert!((effect.spec().spread - of_table).abs() < 0.006, "{}: {of_table}", effect.name());
+        }
+    }
 }

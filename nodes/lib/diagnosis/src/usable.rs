@@ -71,6 +71,7 @@ pub(crate) fn refused(request: &Request<'_>, error: &GapError, data_health: Data
         changes: Vec::new(),
         invisible: Vec::new(),
         detection_limits: Vec::new(),
+        figures: Vec::new(),
         places: Where::default(),
         identities: Vec::new(),
         gap: GapBudget {

@@ -20,7 +20,7 @@ const RETUNE_EXCESS: f64 = 0.1;
 
 /// The verdict of a drive by itself, with its reasons.
 pub(crate) fn decide(budget: &Budget, inferred: &Inferred, library: &[EffectId]) -> (Verdict, Vec<String>) {
-    let mut reasons = figures(budget, inferred.accepted().is_empty());
+    let mut reasons = errors(budget, inferred.accepted().is_empty());
     let named = inferred.accepted();
     let lacking = lacking(inferred);
     for effect in &named {
@@ -67,7 +67,7 @@ pub(crate) fn decide(budget: &Budget, inferred: &Inferred, library: &[EffectId])
 }
 
 /// Errors of the models, in a sentence, and what they say of the drive.
-pub(crate) fn figures(budget: &Budget, nothing_named: bool) -> Vec<String> {
+pub(crate) fn errors(budget: &Budget, nothing_named: bool) -> Vec<String> {
     let (nominal, retuned, after) = (mean(&budget.nominal), budget.retuned(), budget.after());
     let ceiling = mean(&budget.ceiling).min(after);
     let with_effects = if nothing_named { String::new() } else { format!(", {after:.2} with the effects") };

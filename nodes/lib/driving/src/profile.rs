@@ -61,8 +61,8 @@ impl Limits {
         };
         Self {
             lateral_mps2: grip * GRAVITY_MPS2,
-            drive_mps2: most(vehicle.drive_front_share, -shift).min(drivetrain.drive_mps2),
-            brake_mps2: most(vehicle.brake_front_share, shift).min(drivetrain.brake_mps2),
+            drive_mps2: most(vehicle.front_drive_share(), -shift).min(drivetrain.drive_mps2),
+            brake_mps2: most(vehicle.front_brake_share(), shift).min(drivetrain.brake_mps2),
             power_w_per_kg: drivetrain.power_w_per_kg,
             top_speed_mps: drivetrain.top_speed_mps,
         }
@@ -209,7 +209,10 @@ mod tests {
             top_speed_mps: 50.0,
         };
         let limit = |drive_front_share: f64| {
-            let vehicle = VehicleParameters { drive_front_share, ..VehicleParameters::f1tenth() };
+            let vehicle = VehicleParameters {
+                drive_front_share: Some(drive_front_share),
+                ..VehicleParameters::f1tenth()
+            };
             Limits::new(&vehicle, 0.8, &drivetrain).drive_mps2
         };
         let car = VehicleParameters::f1tenth();

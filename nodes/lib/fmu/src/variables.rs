@@ -151,13 +151,14 @@ fn parameters<'a>(car: &'a mut DrivenCar, setting: &'a mut Setting) -> Vec<Param
         }
     }
     let vehicle = &mut car.vehicle;
+    let shares = [vehicle.front_drive_share(), vehicle.front_brake_share()];
     for (name, unit, place) in [
         ("mass_kg", "kg", &mut vehicle.mass_kg),
         ("yaw_inertia_kgm2", "kg.m2", &mut vehicle.yaw_inertia_kgm2),
         ("l_f_m", "m", &mut vehicle.l_f_m),
         ("l_r_m", "m", &mut vehicle.l_r_m),
-        ("drive_front_share", "1", &mut vehicle.drive_front_share),
-        ("brake_front_share", "1", &mut vehicle.brake_front_share),
+        ("drive_front_share", "1", vehicle.drive_front_share.get_or_insert(shares[0])),
+        ("brake_front_share", "1", vehicle.brake_front_share.get_or_insert(shares[1])),
     ] {
         all.push(number(format!("vehicle.{name}"), unit, "As the vehicle file states it", place));
     }

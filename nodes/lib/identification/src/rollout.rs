@@ -127,7 +127,8 @@ impl<'a> TireRollout<'a> {
             let force_n =
                 (steering_rad.sin() * across_mps2 + self.a_x_mps2[window.segment][k]) * self.vehicle.mass_kg;
             let driving = force_n.re() > 0.0;
-            let front = if driving { self.vehicle.drive_front_share } else { self.vehicle.brake_front_share };
+            let front =
+                if driving { self.vehicle.front_drive_share() } else { self.vehicle.front_brake_share() };
             let front_pull_n = force_n * front;
             let pull = [
                 load[0].recip() * front_pull_n * (1.0 / front_n),

@@ -334,9 +334,9 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         let commanded = model.recording.has_command;
         // Force along the front wheels turns with them; it is known only where it is commanded.
         let front_x_n = if commanded {
-            car.front_share(now.force_x_mps2 > 0.0) * now.force_x_mps2 * car.nominal_mass_kg
+            car.front_share(now.force_x_mps2 > 0.0) * (now.force_x_mps2 * car.nominal_mass_kg)
         } else {
-            0.0
+            T::from(0.0)
         };
         let front_y_n = if commanded { front_n * cos + sin * front_x_n } else { front_n * cos };
         let mut a_y = (rear_n + front_y_n) / car.mass_kg + motion.force_y_mps2 + now.extra.push[0];

@@ -25,10 +25,10 @@ pub struct Car<T> {
     pub speed_factor: T,
     /// Grip of the front and the rear axle, D of the Magic Formula.
     pub peak: [T; 2],
-    /// Share of drive and brake force at the front axle.
-    pub drive_front_share: f64,
+    /// Share of the drive force at the front axle.
+    pub drive_front_share: T,
     /// Share of the brake force at the front axle.
-    pub brake_front_share: f64,
+    pub brake_front_share: T,
 }
 
 impl<T: Real> Car<T> {
@@ -45,8 +45,8 @@ impl<T: Real> Car<T> {
             drag_1pm: T::from(0.0),
             speed_factor: T::from(1.0),
             peak,
-            drive_front_share: vehicle.drive_front_share,
-            brake_front_share: vehicle.brake_front_share,
+            drive_front_share: T::from(vehicle.front_drive_share()),
+            brake_front_share: T::from(vehicle.front_brake_share()),
         }
     }
 
@@ -67,7 +67,7 @@ impl<T: Real> Car<T> {
     }
 
     /// Share of the longitudinal force at the front axle.
-    pub fn front_share(&self, driving: bool) -> f64 {
+    pub fn front_share(&self, driving: bool) -> T {
         if driving { self.drive_front_share } else { self.brake_front_share }
     }
 

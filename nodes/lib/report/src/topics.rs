@@ -46,7 +46,7 @@ pub fn topic_uses(topics: &[TopicHealth]) -> Vec<TopicUse<'_>> {
                 _ => ("nothing in a diagnosis; identification uses it", None),
             };
             let needing =
-                EffectId::ALL.iter().filter(|e| need.is_some_and(|need| e.spec().needs.contains(&need)));
+                EffectId::candidates().filter(|e| need.is_some_and(|need| e.spec().needs.contains(&need)));
             TopicUse { health, used_for, invisible_without: needing.map(|e| e.name()).collect() }
         })
         .collect()

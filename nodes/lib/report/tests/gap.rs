@@ -86,6 +86,7 @@ fn diagnosis() -> Diagnosis {
             reason: "needs a longitudinal command".into(),
         }],
         detection_limits: Vec::new(),
+        figures: Vec::new(),
         places: Where {
             channel: vec![Place {
                 low: 0.0,

@@ -35,12 +35,12 @@ pub struct VehicleParameters {
     pub l_r_m: f64,
     /// Height of the centre of gravity.
     pub h_cg_m: f64,
-    /// Share of the drive force at the front axle: 0 rear drive, 1 front drive.
-    #[serde(default)]
-    pub drive_front_share: f64,
-    /// Share of the brake force at the front axle.
-    #[serde(default = "default_brake_front_share")]
-    pub brake_front_share: f64,
+    /// Share of the drive force at the front axle, where stated: 0 rear drive, 1 front drive ([`Self::front_drive_share`]).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drive_front_share: Option<f64>,
+    /// Share of the brake force at the front axle, where stated ([`Self::front_brake_share`]).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub brake_front_share: Option<f64>,
     /// Largest road-wheel angle.
     #[serde(default = "default_max_steering_rad")]
     pub max_steering_rad: f64,
@@ -49,10 +49,8 @@ pub struct VehicleParameters {
     pub wheel_radius_m: Option<f64>,
 }
 
-/// Brake balance of a car whose own is not known.
-fn default_brake_front_share() -> f64 {
-    0.6
-}
+/// Wheelbase up to which a car is a model car.
+const MODEL_CAR_M: f64 = 1.0;
 
 /// A common lock of 1:10 cars; full-size cars have more and use less.
 fn default_max_steering_rad() -> f64 {
@@ -107,12 +105,29 @@ impl VehicleParameters {
                 must: "at least 0 and finite",
             });
         }
-        let shares =
-            [("drive_front_share", self.drive_front_share), ("brake_front_share", self.brake_front_share)];
+        let shares = [
+            ("drive_front_share", self.front_drive_share()),
+            ("brake_front_share", self.front_brake_share()),
+        ];
         if let Some(&(name, got)) = shares.iter().find(|(_, v)| !(0.0..=1.0).contains(v)) {
             return Err(VehicleError::Parameter { name, got, must: "between 0 and 1" });
         }
         Ok(self)
+    }
+
+    /// Share of the drive force at the front axle; where it is not stated, what cars of this size mostly have: 1:10 cars drive all wheels, others the
+    /// rear.
+    #[must_use]
+    pub fn front_drive_share(&self) -> f64 {
+        let usual = if self.wheelbase_m() < MODEL_CAR_M { 0.5 } else { 0.0 };
+        self.drive_front_share.unwrap_or(usual)
+    }
+
+    /// Share of the brake force at the front axle; where it is not stated, what cars of this size mostly have: 1:10 cars brake with the motor.
+    #[must_use]
+    pub fn front_brake_share(&self) -> f64 {
+        let usual = if self.wheelbase_m() < MODEL_CAR_M { 0.5 } else { 0.6 };
+        self.brake_front_share.unwrap_or(usual)
     }
 
     /// Distance between the axles.
@@ -130,8 +145,8 @@ impl VehicleParameters {
             self.l_f_m,
             self.l_r_m,
             self.h_cg_m,
-            self.drive_front_share,
-            self.brake_front_share,
+            self.front_drive_share(),
+            self.front_brake_share(),
             self.max_steering_rad,
             self.wheel_radius_m.unwrap_or(0.0),
         ];
@@ -152,8 +167,8 @@ impl VehicleParameters {
             l_f_m: 0.162,
             l_r_m: 0.145,
             h_cg_m: 0.06,
-            drive_front_share: 0.0,
-            brake_front_share: default_brake_front_share(),
+            drive_front_share: None,
+            brake_front_share: None,
             max_steering_rad: default_max_steering_rad(),
             wheel_radius_m: None,
         }

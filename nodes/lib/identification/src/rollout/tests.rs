@@ -40,7 +40,7 @@ fn end<T: Real>(vehicle: &VehicleParameters, p: &[T]) -> [T; 2] {
 
 #[test]
 fn derivatives_are_those_of_the_rollout() {
-    let vehicle = VehicleParameters { drive_front_share: 0.4, ..VehicleParameters::f1tenth() };
+    let vehicle = VehicleParameters { drive_front_share: Some(0.4), ..VehicleParameters::f1tenth() };
     let at = parameters();
     let duals: Vec<Dual<PARAMETERS>> = (0..PARAMETERS).map(|j| Dual::variable(at[j], j)).collect();
     let found = end(&vehicle, &duals);

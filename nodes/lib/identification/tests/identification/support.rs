@@ -19,8 +19,8 @@ pub(crate) fn vehicle(car: &CarParameters) -> VehicleParameters {
         l_f_m: car.l_f_m,
         l_r_m: car.l_r_m,
         h_cg_m: car.h_cg_m,
-        drive_front_share: car.drive.drive_front_share,
-        brake_front_share: car.drive.brake_front_share,
+        drive_front_share: Some(car.drive.drive_front_share),
+        brake_front_share: Some(car.drive.brake_front_share),
         max_steering_rad: car.max_steering_rad,
         ..VehicleParameters::f1tenth()
     }

@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectSpec, ParameterSpec, both_sides, spec};
+use super::{Effect, EffectSpec, Figure, ParameterSpec, both_sides, spec};
 use crate::site::Site;
 use crate::terms::Car;
 
@@ -11,15 +11,23 @@ use crate::terms::Car;
 pub(super) struct CogShift;
 
 impl Effect for CogShift {
-    const SPEC: EffectSpec = spec(
-        "cog_shift",
-        "l_f -= dl, l_r += dl, static loads follow; v_y is still measured at the nominal point",
-        "fuel, ballast, corner weights not taken",
-        "medium and high lateral acceleration, transients",
-        &[Site::LoadsAndBody],
-        // Further than a twelfth of the wheelbase nobody misplaces it.
-        &[ParameterSpec { range: [-2.5, 2.5], ..both_sides("dl_m", "m", [0.01, 0.08]) }],
-    );
+    const SPEC: EffectSpec = EffectSpec {
+        figure: Some(Figure {
+            name: "l_f_m",
+            stated: |car| Some(car.l_f_m),
+            value: |car, shift_m| car.l_f_m - shift_m,
+        }),
+        spread: 1.00,
+        ..spec(
+            "cog_shift",
+            "l_f -= dl, l_r += dl, static loads follow; v_y is still measured at the nominal point",
+            "fuel, ballast, corner weights not taken",
+            "medium and high lateral acceleration, transients",
+            &[Site::LoadsAndBody],
+            // Further than a twelfth of the wheelbase nobody misplaces it.
+            &[ParameterSpec { range: [-2.5, 2.5], ..both_sides("dl_m", "m", [0.01, 0.08]) }],
+        )
+    };
 
     fn car<T: Real>(p: &[T], car: &mut Car<T>) {
         car.l_f_m -= p[0];

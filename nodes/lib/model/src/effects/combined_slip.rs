@@ -18,6 +18,7 @@ impl Effect for CombinedSlip {
         usual: Some(|_, size| 0.14 * size),
         reported: &[Reported { name: "k", unit: "1", value: |p| p[0].max(0.0).sqrt() }],
         starts: &[0.7],
+        spread: 0.08,
         ..spec(
             "combined_slip",
             "F_y *= sqrt(max(0, 1 - (k F_x/(mu F_z))^2)) per axle",
@@ -31,10 +32,10 @@ impl Effect for CombinedSlip {
     fn grip<T: Real>(p: &[T], car: &Car<T>, at: &Moment<T>, axles: &mut Axles<T>) {
         let front = car.front_share(at.force_x_mps2 > 0.0);
         for (axle, share, peak) in
-            [(&mut axles.front, front, car.peak[0]), (&mut axles.rear, 1.0 - front, car.peak[1])]
+            [(&mut axles.front, front, car.peak[0]), (&mut axles.rear, T::from(1.0) - front, car.peak[1])]
         {
             let use_x =
-                (peak * axle.grip * axle.load_n).recip() * (at.force_x_mps2 * car.nominal_mass_kg * share);
+                (peak * axle.grip * axle.load_n).recip() * share * (at.force_x_mps2 * car.nominal_mass_kg);
             let square = T::from(1.0) - p[0] * use_x * use_x;
             axle.usable *=
                 if square.re() < LEAST_SQUARE { T::from(LEAST_SQUARE.sqrt()) } else { square.sqrt() };

@@ -23,6 +23,16 @@ pub(super) const fn ratio(size: f64) -> ParameterSpec {
     ParameterSpec { name: "ratio", unit: "1", null: 1.0, size: [size, size], range: [-3.0, 5.0] }
 }
 
+/// A share of a force at the front axle that comes on top of the one stated.
+pub(super) const fn share() -> ParameterSpec {
+    ParameterSpec { name: "share", unit: "1", null: 0.0, size: [0.1, 0.1], range: [-5.0, 5.0] }
+}
+
+/// How well the split of a force between the axles is known, as a standard deviation: a few percent where it is stated, else anything.
+pub(super) fn split(stated: Option<f64>) -> f64 {
+    if stated.is_some() { 0.03 } else { 0.3 }
+}
+
 /// Scales the grip of both axles: D at constant cornering stiffness.
 pub(super) fn scale<T: Real>(axles: &mut Axles<T>, front: T, rear: T) {
     for (axle, factor) in [(&mut axles.front, front), (&mut axles.rear, rear)] {

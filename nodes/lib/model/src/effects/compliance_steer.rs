@@ -11,20 +11,23 @@ use crate::terms::{Axles, Car, Moment};
 pub(super) struct ComplianceSteer;
 
 impl Effect for ComplianceSteer {
-    const SPEC: EffectSpec = spec(
-        "compliance_steer",
-        "d -= c F_yf/F_zf",
-        "elastic steering and suspension; Milliken, Race Car Vehicle Dynamics, chapter 23",
-        "medium lateral acceleration, transients",
-        &[Site::FrontAxle],
-        &[ParameterSpec {
-            name: "rad_per_g",
-            unit: "rad/g",
-            null: 0.0,
-            size: [0.015, 0.008],
-            range: [-2.0, 5.0],
-        }],
-    );
+    const SPEC: EffectSpec = EffectSpec {
+        spread: 0.11,
+        ..spec(
+            "compliance_steer",
+            "d -= c F_yf/F_zf",
+            "elastic steering and suspension; Milliken, Race Car Vehicle Dynamics, chapter 23",
+            "medium lateral acceleration, transients",
+            &[Site::FrontAxle],
+            &[ParameterSpec {
+                name: "rad_per_g",
+                unit: "rad/g",
+                null: 0.0,
+                size: [0.015, 0.008],
+                range: [-2.0, 5.0],
+            }],
+        )
+    };
 
     fn loads<T: Real>(p: &[T], _car: &Car<T>, at: &Moment<T>, axles: &mut Axles<T>) {
         axles.front.steer_rad -= p[0] * at.front_use;

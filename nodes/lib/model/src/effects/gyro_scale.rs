@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectSpec, both_sides, spec};
+use super::{Effect, EffectSpec, Figure, both_sides, spec};
 use crate::site::Site;
 use crate::terms::Outputs;
 
@@ -11,14 +11,17 @@ use crate::terms::Outputs;
 pub(super) struct GyroScale;
 
 impl Effect for GyroScale {
-    const SPEC: EffectSpec = spec(
-        "gyro_scale",
-        "r_m = (1 + s) r",
-        "scale error of the gyroscope",
-        "any drive",
-        &[Site::YawRate],
-        &[both_sides("scale", "1", [0.03, 0.03])],
-    );
+    const SPEC: EffectSpec = EffectSpec {
+        figure: Some(Figure { name: "yaw_rate_scale", stated: |_| Some(1.0), value: |_, scale| 1.0 + scale }),
+        ..spec(
+            "gyro_scale",
+            "r_m = (1 + s) r",
+            "scale error of the gyroscope",
+            "any drive",
+            &[Site::YawRate],
+            &[both_sides("scale", "1", [0.03, 0.03])],
+        )
+    };
 
     fn sense<T: Real>(p: &[T], out: &mut Outputs<T>) {
         for r in &mut out.yaw_rate_radps {

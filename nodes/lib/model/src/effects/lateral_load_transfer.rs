@@ -14,6 +14,7 @@ pub(super) struct LateralLoadTransfer;
 impl Effect for LateralLoadTransfer {
     const SPEC: EffectSpec = EffectSpec {
         usual: Some(|_, size| 0.27 * size),
+        spread: 0.19,
         ..spec(
             "lateral_load_transfer",
             "D (1 - k (a_y/a_max)^2), a_max what the tires give with their loads",

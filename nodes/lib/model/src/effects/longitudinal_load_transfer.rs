@@ -3,7 +3,7 @@
 use gripsight_vehicle::Real;
 
 use super::common::{LOAD_SENSITIVITY_SHARE, add_load};
-use super::{Effect, EffectSpec, Unknown, positive, spec};
+use super::{Effect, EffectSpec, Figure, Unknown, positive, spec};
 use crate::site::Site;
 use crate::terms::{Axles, Car, Moment};
 
@@ -13,9 +13,11 @@ pub(super) struct LongitudinalLoadTransfer;
 
 impl Effect for LongitudinalLoadTransfer {
     const SPEC: EffectSpec = EffectSpec {
+        figure: Some(Figure { name: "h_cg_m", stated: |car| Some(car.h_cg_m), value: |_, h_cg_m| h_cg_m }),
         // About a third of what the height of the centre of gravity gives.
         usual: Some(|car, _| 0.33 * car.h_cg_m),
         unknown: Unknown { share: LOAD_SENSITIVITY_SHARE, samples: 0.0 },
+        spread: 0.19,
         ..spec(
             "longitudinal_load_transfer",
             "F_zf -= (m a_x + drag) h/L, F_zr += (m a_x + drag) h/L",

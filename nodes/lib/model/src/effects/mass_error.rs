@@ -3,7 +3,7 @@
 use gripsight_vehicle::Real;
 
 use super::common::{COMMAND, ratio};
-use super::{Effect, EffectSpec, spec};
+use super::{Effect, EffectSpec, Figure, spec};
 use crate::site::Site;
 use crate::terms::Car;
 
@@ -13,6 +13,11 @@ pub(super) struct MassError;
 
 impl Effect for MassError {
     const SPEC: EffectSpec = EffectSpec {
+        figure: Some(Figure {
+            name: "mass_kg",
+            stated: |car| Some(car.mass_kg),
+            value: |car, ratio| car.mass_kg * ratio,
+        }),
         along: true,
         needs: COMMAND,
         ..spec(

@@ -16,11 +16,13 @@
 
 mod aero_downforce;
 mod aero_drag;
+mod brake_split;
 mod cog_shift;
 mod combined_slip;
 mod common;
 mod compliance_steer;
 mod differential_yaw_moment;
+mod drive_split;
 mod grip_balance;
 mod grip_scale;
 mod gyro_bias;
@@ -58,7 +60,7 @@ use gripsight_vehicle::{Real, VehicleParameters};
 use crate::ModelError;
 use crate::terms::{Axles, Car, Moment, Motion, Outputs};
 
-pub use spec::{EffectSpec, Lagging, Need, ParameterSpec, Reported, Unknown, Usual};
+pub use spec::{EffectSpec, Figure, Lagging, Need, ParameterSpec, Reported, Unknown, Usual};
 use spec::{both_sides, positive, spec};
 
 /// What an effect between the steering and the road wheels remembers from angle to angle.
@@ -224,6 +226,8 @@ library! {
     ImuTilt = imu_tilt::ImuTilt,
     GyroScale = gyro_scale::GyroScale,
     GyroBias = gyro_bias::GyroBias,
+    DriveSplit = drive_split::DriveSplit,
+    BrakeSplit = brake_split::BrakeSplit,
 }
 
 impl EffectId {
@@ -240,8 +244,13 @@ impl EffectId {
     pub fn known(name: &str) -> Result<Self, ModelError> {
         Self::by_name(name).ok_or_else(|| ModelError::UnknownEffect {
             name: name.to_owned(),
-            known: Self::ALL.iter().map(|e| e.name()).collect::<Vec<_>>().join(", "),
+            known: Self::candidates().map(|e| e.name()).collect::<Vec<_>>().join(", "),
         })
+    }
+
+    /// Those that may be named as a cause, in the library's order.
+    pub fn candidates() -> impl Iterator<Item = Self> {
+        Self::ALL.iter().copied().filter(|e| !e.spec().is_nuisance)
     }
 
     /// Those that every car has a little of, in the library's order.
@@ -301,7 +310,7 @@ mod tests {
             }
         }
         assert_eq!(EffectId::by_name("magic"), None);
-        assert_eq!(EffectId::ALL.len(), 34);
+        assert_eq!(EffectId::candidates().count(), 34);
     }
 
     #[test]
@@ -313,6 +322,9 @@ mod tests {
         assert_eq!(usual(EffectId::LongitudinalLoadTransfer), Some(0.33 * 0.1));
         assert_eq!(usual(EffectId::YawInertiaError), Some(0.67 * 2.0));
         assert_eq!(usual(EffectId::GyroScale), None);
-        assert_eq!(EffectId::background().count(), 5);
+        let stated = VehicleParameters { drive_front_share: Some(0.5), ..car };
+        assert_eq!(EffectId::DriveSplit.usual(&stated, 0.1), Some(0.03));
+        assert_eq!(EffectId::BrakeSplit.usual(&stated, 0.1), Some(0.3));
+        assert_eq!(EffectId::background().count(), 7);
     }
 }

@@ -14,6 +14,7 @@ pub(super) struct RollSteer;
 impl Effect for RollSteer {
     const SPEC: EffectSpec = EffectSpec {
         lagging: &[Lagging::Roll],
+        spread: 0.06,
         ..spec(
             "roll_steer",
             "d_r = k a_y/g behind the roll of the body",

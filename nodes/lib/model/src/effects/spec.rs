@@ -77,6 +77,17 @@ pub struct Reported {
 /// How much of its first parameter a car may well have without anything being the matter: from the car, and from a size that matters.
 pub type Usual = fn(&VehicleParameters, f64) -> f64;
 
+/// A figure of the car as a team states it.
+#[derive(Debug, Clone, Copy)]
+pub struct Figure {
+    /// Name as in the vehicle file, unit included; of a sensor's scale the signal's.
+    pub name: &'static str,
+    /// What is stated; `None` where nothing is.
+    pub stated: fn(&VehicleParameters) -> Option<f64>,
+    /// The figure where the effect's first parameter has a value.
+    pub value: fn(&VehicleParameters, f64) -> f64,
+}
+
 /// What follows with a lag in the motion for an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Lagging {
@@ -133,6 +144,10 @@ pub struct EffectSpec {
     pub alike: &'static [EffectId],
     /// How much of it every car may have; nothing of an effect that a sound car has nothing of.
     pub usual: Option<Usual>,
+    /// The figure of the car that its first parameter is the error of.
+    pub figure: Option<Figure>,
+    /// Whether it is fitted along and never a candidate.
+    pub is_nuisance: bool,
     /// Whether it sits in one part of the lap.
     pub of_a_place: bool,
     /// Whether it pushes along the car: the command and the longitudinal acceleration show it, and the tires' lateral forces hardly mind.
@@ -147,6 +162,9 @@ pub struct EffectSpec {
     pub goes_by: Option<EffectId>,
     /// What no fit can know of its size.
     pub unknown: Unknown,
+    /// Standard deviation, in sizes that matter, of what fits find of it in cars that have none of it: whatever the model lacks may look like it.
+    /// `tests/results/withheld/fit_spread.py` finds it on development cases.
+    pub spread: f64,
 }
 
 /// A parameter with its null at 0 and bounds on both sides.
@@ -182,6 +200,8 @@ pub(super) const fn spec(
         flat_at_null: false,
         alike: &[],
         usual: None,
+        figure: None,
+        is_nuisance: false,
         of_a_place: false,
         along: false,
         of_a_command: false,
@@ -189,6 +209,7 @@ pub(super) const fn spec(
         company: None,
         goes_by: None,
         unknown: Unknown { share: 0.0, samples: 0.0 },
+        spread: 0.0,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectSpec, Wheels, both_sides, spec};
+use super::{Effect, EffectSpec, Figure, Wheels, both_sides, spec};
 use crate::site::Site;
 
 /// The wheels turn more than the recording says.
@@ -10,14 +10,18 @@ use crate::site::Site;
 pub(super) struct SteeringGain;
 
 impl Effect for SteeringGain {
-    const SPEC: EffectSpec = spec(
-        "steering_gain",
-        "d = (1 + g) u",
-        "steering ratio, servo scale",
-        "low lateral acceleration over a range of speeds",
-        &[Site::Steering],
-        &[both_sides("gain", "1", [0.05, 0.05])],
-    );
+    const SPEC: EffectSpec = EffectSpec {
+        figure: Some(Figure { name: "steering_scale", stated: |_| Some(1.0), value: |_, gain| 1.0 + gain }),
+        spread: 0.20,
+        ..spec(
+            "steering_gain",
+            "d = (1 + g) u",
+            "steering ratio, servo scale",
+            "low lateral acceleration over a range of speeds",
+            &[Site::Steering],
+            &[both_sides("gain", "1", [0.05, 0.05])],
+        )
+    };
 
     fn follow<T: Real>(p: &[T], _wheels: &mut Wheels<T>, steering_rad: T, _dt_s: f64) -> T {
         steering_rad * (p[0] + 1.0)

@@ -12,20 +12,23 @@ use crate::terms::{Axles, Car, Moment};
 pub(super) struct TireWear;
 
 impl Effect for TireWear {
-    const SPEC: EffectSpec = spec(
-        "tire_wear",
-        "D (1 - rate t)",
-        "wear and heat of the tires over a run, to first order",
-        "a long run near the limit",
-        &[Site::FrontAxle, Site::RearAxle],
-        &[ParameterSpec {
-            name: "rate_per_min",
-            unit: "1/min",
-            null: 0.0,
-            size: [0.06, 0.06],
-            range: [-5.0, 10.0],
-        }],
-    );
+    const SPEC: EffectSpec = EffectSpec {
+        spread: 0.12,
+        ..spec(
+            "tire_wear",
+            "D (1 - rate t)",
+            "wear and heat of the tires over a run, to first order",
+            "a long run near the limit",
+            &[Site::FrontAxle, Site::RearAxle],
+            &[ParameterSpec {
+                name: "rate_per_min",
+                unit: "1/min",
+                null: 0.0,
+                size: [0.06, 0.06],
+                range: [-5.0, 10.0],
+            }],
+        )
+    };
 
     fn grip<T: Real>(p: &[T], _car: &Car<T>, at: &Moment<T>, axles: &mut Axles<T>) {
         let factor = T::from(1.0) - p[0] * at.minutes;

@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectSpec, both_sides, spec};
+use super::{Effect, EffectSpec, Figure, both_sides, spec};
 use crate::site::Site;
 use crate::terms::{Car, Outputs};
 
@@ -11,14 +11,17 @@ use crate::terms::{Car, Outputs};
 pub(super) struct VxScale;
 
 impl Effect for VxScale {
-    const SPEC: EffectSpec = spec(
-        "v_x_scale",
-        "v_xm = (1 + s) v_x",
-        "rolling radius, scale of the odometry",
-        "any drive, with an accelerometer or a range of speeds",
-        &[Site::Vx],
-        &[both_sides("scale", "1", [0.025, 0.025])],
-    );
+    const SPEC: EffectSpec = EffectSpec {
+        figure: Some(Figure { name: "v_x_scale", stated: |_| Some(1.0), value: |_, scale| 1.0 + scale }),
+        ..spec(
+            "v_x_scale",
+            "v_xm = (1 + s) v_x",
+            "rolling radius, scale of the odometry",
+            "any drive, with an accelerometer or a range of speeds",
+            &[Site::Vx],
+            &[both_sides("scale", "1", [0.025, 0.025])],
+        )
+    };
 
     fn car<T: Real>(p: &[T], car: &mut Car<T>) {
         car.speed_factor *= (p[0] + 1.0).recip();

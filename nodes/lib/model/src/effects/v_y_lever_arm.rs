@@ -11,14 +11,17 @@ use crate::terms::Outputs;
 pub(super) struct VyLeverArm;
 
 impl Effect for VyLeverArm {
-    const SPEC: EffectSpec = spec(
-        "v_y_lever_arm",
-        "v_ym = v_y + x r",
-        "velocity of a point of a rigid body; x ahead of the centre of gravity",
-        "cornering over a range of speeds",
-        &[Site::Vy],
-        &[both_sides("x_m", "m", [0.05, 0.4])],
-    );
+    const SPEC: EffectSpec = EffectSpec {
+        spread: 0.03,
+        ..spec(
+            "v_y_lever_arm",
+            "v_ym = v_y + x r",
+            "velocity of a point of a rigid body; x ahead of the centre of gravity",
+            "cornering over a range of speeds",
+            &[Site::Vy],
+            &[both_sides("x_m", "m", [0.05, 0.4])],
+        )
+    };
 
     fn sense<T: Real>(p: &[T], out: &mut Outputs<T>) {
         for (v, r) in out.v_y_mps.iter_mut().zip(&out.yaw_rate_radps) {

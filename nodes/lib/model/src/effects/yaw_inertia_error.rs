@@ -3,7 +3,7 @@
 use gripsight_vehicle::Real;
 
 use super::common::ratio;
-use super::{Effect, EffectSpec, spec};
+use super::{Effect, EffectSpec, Figure, spec};
 use crate::site::Site;
 use crate::terms::Car;
 
@@ -13,8 +13,14 @@ pub(super) struct YawInertiaError;
 
 impl Effect for YawInertiaError {
     const SPEC: EffectSpec = EffectSpec {
+        figure: Some(Figure {
+            name: "yaw_inertia_kgm2",
+            stated: |car| Some(car.yaw_inertia_kgm2),
+            value: |car, ratio| car.yaw_inertia_kgm2 * ratio,
+        }),
         // It is seldom measured: a tenth.
         usual: Some(|_, size| 0.67 * size),
+        spread: 0.19,
         ..spec(
             "yaw_inertia_error",
             "I_z *= ratio",

@@ -1,6 +1,7 @@
 //! The page of a diagnosis: where model and real car disagree, why, and by how much.
 
 mod budget;
+mod figures;
 mod pictures;
 mod sites;
 mod tables;
@@ -64,6 +65,7 @@ fn explained(d: &Diagnosis) -> Result<Markup, ReportError> {
     Ok(html! {
         (section("How large the gap is", true, &budget::budget(d)))
         (section("Where something is the matter", true, &sites::table(d)))
+        @if !d.figures.is_empty() { (section("Figures of the car", d.figures.iter().any(|f| f.contradicted), &figures::table(d))) }
         (section("Effects, ranked", true, &tables::effects(d)))
         (section("Front tires", false, &figure(&front, "")?))
         (section("Rear tires", false, &figure(&rear, "")?))

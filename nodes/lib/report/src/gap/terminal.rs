@@ -5,6 +5,7 @@ use std::fmt::Write;
 use gripsight_diagnosis::{Diagnosis, Place, Verdict};
 use gripsight_estimation::Estimate;
 
+use super::figures;
 use super::sites;
 use super::verdict::{Before, sentence};
 use super::words::{closes, figure, listed, sizes, unit, words};
@@ -43,6 +44,7 @@ pub fn gap_text(d: &Diagnosis, before: Option<Before<'_>>, data_notes: &[String]
     }
     budget(&mut out, d);
     sites::lines(&mut out, d);
+    figures::lines(&mut out, d);
     effects(&mut out, d);
     places(&mut out, d);
     // What `next` says how to see needs no line of its own.
