@@ -87,10 +87,13 @@ impl Differences {
         self.compared.later(engine, &earlier.inferred)
     }
 
-    /// An effect's parameters in the later drive, with the standard deviations of the differences.
+    /// An effect's parameters in the later drive, with standard deviations of what the earlier drive has and of the differences together.
     pub(crate) fn size(&self, earlier: &Earlier, effect: EffectId) -> Sized {
         let before = self.compared.earlier(&earlier.inferred, effect).unwrap_or_default();
-        let (by, sigma) = self.compared.difference(&earlier.inferred, effect).unwrap_or_default();
+        let (by, mut sigma) = self.compared.difference(&earlier.inferred, effect).unwrap_or_default();
+        let own = earlier.inferred.sizes.effect(&earlier.inferred.columns, effect);
+        let own = own.map_or_else(Vec::new, |(_, sigma)| sigma);
+        sigma.iter_mut().zip(own).for_each(|(s, own)| *s = s.hypot(own));
         (before.iter().zip(&by).map(|(b, d)| b + d).collect(), sigma)
     }
 
