@@ -208,7 +208,7 @@ impl TirePosterior {
 fn seconds(sequence: &StateSequence) -> Vec<String> {
     const NS: i64 = 1_000_000_000;
     let second = |i: usize| {
-        (sequence.start_stamp_ns as i64 + (f64::from(sequence.time_s[i]) * NS as f64) as i64).div_euclid(NS)
+        (sequence.start_stamp_ns + (f64::from(sequence.time_s[i]) * NS as f64) as i64).div_euclid(NS)
     };
     let mut out: Vec<(i64, u64)> = Vec::new();
     for i in 0..sequence.len() {
