@@ -27,14 +27,22 @@ fn set(grip: f64, trust: Trust) -> TireSet {
     TireSet { trust, ..TireSet::assumed(tires(grip)) }
 }
 
+fn rear_driven() -> VehicleParameters {
+    VehicleParameters {
+        drive_front_share: Some(0.0),
+        brake_front_share: Some(0.6),
+        ..VehicleParameters::f1tenth()
+    }
+}
+
 fn driver(start: TireSet) -> Driver {
-    Driver::new(VehicleParameters::f1tenth(), DRIVETRAIN, track(), start, Settings::default()).unwrap()
+    Driver::new(rear_driven(), DRIVETRAIN, track(), start, Settings::default()).unwrap()
 }
 
 /// Drives `duration_s` on tires of a grip, the steering late by `delay_s`; the largest distance to the line after 3 s.
 fn drive(driver: &mut Driver, grip: impl Fn(f64) -> f64, delay_s: f64, duration_s: f64) -> f64 {
     const DT_S: f64 = 0.01;
-    let vehicle = VehicleParameters::f1tenth();
+    let vehicle = rear_driven();
     let at = driver.track().at(0.0);
     let mut car = CarState {
         stamp_s: 0.0,
