@@ -10,7 +10,7 @@ use crate::engine::Engine;
 use crate::figures::figures;
 use crate::finding::{detection_limits, ranked, sites};
 use crate::infer::{Inferred, infer, linearised};
-use crate::outcome::{Diagnosis, Inference, Invisible, TirePair};
+use crate::outcome::{Diagnosis, Inference, Invisible, TirePair, Verdict};
 use crate::state::State;
 use crate::trust::TireTrust;
 use crate::usable::{Usable, cannot_tell, refused, usable};
@@ -140,17 +140,23 @@ pub(crate) fn explain(
             // Both drives in the same columns, around the same tires, with nothing held.
             let like = &earlier.inferred;
             let mut alike = Engine::new(&recording, request.vehicle, like.tires, TireTrust::file());
-            let null = fitted_null(&alike, &search_windows)?;
             let (mut values, mut chosen) = (like.values.clone(), like.chosen.clone());
             let mut compared = None;
-            // The first time around the earlier drive's model, then around what the comparison makes of the later one.
-            for _ in 0..COMPARISONS {
+            // First where the earlier drive was linearised: fits may end apart although nothing has changed. Where something has, around the
+            // later drive's own fits: from the earlier model on, then from what that comparison makes of it.
+            for comparison in 0..=COMPARISONS {
                 let at = (&values[..], &chosen[..]);
-                let later =
-                    linearised(&mut alike, &null, like, at, &search_windows).ok_or(GapError::NotFinite)?;
+                let later = linearised(&mut alike, like, at, comparison > 0, &search_windows)
+                    .ok_or(GapError::NotFinite)?;
                 let differences = earlier.compared(&alike, &later).ok_or(GapError::NotFinite)?;
-                (values, chosen) = differences.later(&alike, earlier);
+                let same = differences.verdict() == Verdict::NoGap;
+                if comparison > 0 {
+                    (values, chosen) = differences.later(&alike, earlier);
+                }
                 compared = Some((later, differences));
+                if same {
+                    break;
+                }
             }
             let (later, differences) = compared.ok_or(GapError::NotFinite)?;
             engine.sigma.clone_from(&alike.sigma);

@@ -191,14 +191,6 @@ impl<'a> Engine<'a> {
         }
     }
 
-    /// Start states of a state's model on other windows.
-    pub(crate) fn starts_of(&self, state: &State, windows: &Windows) -> Vec<[f64; 2]> {
-        if state.starts.len() == windows.windows.len() {
-            return state.starts.clone();
-        }
-        self.score(&state.effects, None, &state.parameters, windows).starts
-    }
-
     /// Fits flexible terms on top of a state, whose own parameters stay: an upper bound of what an additive term explains.
     pub(crate) fn fit_flexible(&self, state: &State, flexible: &Flexible, windows: &Windows) -> Vec<f64> {
         const STEPS: usize = 2;

@@ -49,6 +49,8 @@ pub(crate) struct Inferred {
     pub(crate) weighed: Weighed,
     /// How many times the errors' information is smaller than if they were independent.
     pub(crate) dispersion: f64,
+    /// Noise of each channel.
+    pub(crate) sigma: Vec<f64>,
     pub(crate) rounds: usize,
 }
 
@@ -169,6 +171,7 @@ pub(crate) fn infer(
                 terms,
                 weighed,
                 dispersion,
+                sigma: engine.sigma.clone(),
                 rounds,
             });
         }
@@ -181,21 +184,25 @@ pub(crate) fn infer(
     }
 }
 
-/// Linearises another drive in the same columns, around the best fit to it of a configuration, from given values on. The engine's channel weights
-/// become those of the noise found.
+/// Linearises another drive in the same columns: at given values, or around the best fit to it of a configuration from there on. The engine's channel
+/// weights become those of the noise found.
 pub(crate) fn linearised(
     engine: &mut Engine<'_>,
-    null: &State,
     like: &Inferred,
     (from, chosen): (&[f64], &[usize]),
+    fitted: bool,
     windows: &Windows,
 ) -> Option<Inferred> {
     let columns = like.columns.clone();
     let mut values = from.to_vec();
-    let mut starts = engine.starts_of(null, windows);
-    engine.sigma.clone_from(&engine.recording.weights);
+    // The same sensors: no less noise than the first drive was found to have.
+    engine.sigma.clone_from(&like.sigma);
     let base = engine.sigma.clone();
     let library: Vec<EffectId> = columns.effects.iter().copied().filter(|e| like.is_open(*e)).collect();
+    let there = |range: std::ops::Range<usize>| range.into_iter().any(|c| from[c] != 0.0);
+    let sites: Vec<Site> = Site::ALL.into_iter().filter(|s| there(columns.of_site(*s))).collect();
+    let (model, own, _) = columns.model(engine, from, |e| columns.of_effect(e).is_some_and(&there), &sites);
+    let mut starts = engine.score_model(&model, &own, windows).starts;
     for round in 1.. {
         let mut joint = Joint::around(engine, &columns, &values, &starts, windows)?;
         differences(engine, &columns, &mut values, &starts, windows, &mut joint);
@@ -224,8 +231,12 @@ pub(crate) fn linearised(
                 terms,
                 weighed,
                 dispersion,
+                sigma: engine.sigma.clone(),
                 rounds: round,
             });
+        }
+        if !fitted {
+            continue;
         }
         let around = Around {
             engine,
