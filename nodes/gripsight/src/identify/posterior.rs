@@ -24,7 +24,9 @@ pub(super) fn write(
 ) -> anyhow::Result<Option<PathBuf>> {
     let path = out.join(FILE);
     let (usable, _) = for_diagnosis(sequence, vehicle)?;
-    match own_tires(&usable, vehicle, (result.status.name(), &result.key.vehicle_hash)) {
+    // A set that may be used is near the car's own tires.
+    let start = result.accepted.then_some(result.phi_p);
+    match own_tires(&usable, vehicle, start, (result.status.name(), &result.key.vehicle_hash)) {
         Ok(posterior) => {
             fs::write(&path, serde_json::to_string_pretty(&posterior)? + "\n")
                 .with_context(|| format!("cannot write {}", path.display()))?;

@@ -52,17 +52,22 @@ pub struct TirePosterior {
     pub data: Vec<String>,
 }
 
-/// Fits the car's own tires to a drive. `status` and `vehicle_hash` of the identification that they go along with.
+/// Fits the car's own tires to a drive. `start`: tires that are known to be near, or none: then from several. `status` and `vehicle_hash` of the
+/// identification that they go along with.
 ///
 /// # Errors
 /// [`GapError`] where the drive cannot tell, or the fit does not end at finite numbers.
 pub fn own_tires(
     sequence: &StateSequence,
     vehicle: &VehicleParameters,
+    start: Option<PacejkaParameters>,
     (status, vehicle_hash): (&str, &str),
 ) -> Result<TirePosterior, GapError> {
     let Usable { recording, windows } = usable(&Request::new(sequence, vehicle), &DataHealth::of(sequence)?)?;
-    let tires = fit_tires(&recording, vehicle, &windows.training)?;
+    let tires = match start {
+        Some(tires) => tires,
+        None => fit_tires(&recording, vehicle, &windows.training)?,
+    };
     let mut engine = Engine::new(&recording, vehicle, tires, TireTrust::free());
     let windows = split(&recording, false).training.thinned(SEARCH_WINDOWS);
     let null = fitted_null(&engine, &windows)?;

@@ -154,10 +154,7 @@ fn of_two_drives_only_what_has_changed_is_told() {
     let gone = since(&prompt);
     assert_eq!(named(&gone), ["steering_delay"], "{}", text(&gone));
     let delay_s = gone.effects[0].parameters["delay_s"].clone();
-    assert!(
-        delay_s.low <= 0.0 && delay_s.high < 0.01 && delay_s.before.unwrap() > 0.035,
-        "{delay_s:?}"
-    );
+    assert!(delay_s.low <= 0.0 && delay_s.high < 0.01 && delay_s.before.unwrap() > 0.035, "{delay_s:?}");
 }
 
 #[test]
@@ -170,14 +167,15 @@ fn a_car_s_own_tires_cost_no_name_on_their_own_drive_and_show_grip_on_another() 
         let request = Request { posterior: Some(posterior), ..Request::new(sequence, &vehicle) };
         diagnose(&request, &mut |_| {}).unwrap()
     };
-    let posterior = own_tires(&recording, &vehicle, ("accepted", "0")).unwrap();
+    let posterior = own_tires(&recording, &vehicle, None, ("accepted", "0")).unwrap();
     let json = serde_json::to_string(&posterior).unwrap();
     let posterior = TirePosterior::from_json(&json).unwrap();
     assert_eq!(named(&of(&recording, &posterior)), named(&diagnosed(&recording, &[])));
     // On the drive that they were fitted on they say nothing of grip; on another they do.
     let invisible = |d: &Diagnosis| d.invisible.iter().any(|i| i.name == "grip_scale");
     assert!(invisible(&of(&recording, &posterior)));
-    let clean = own_tires(&drive(&car, &[], DURATION_S, 32).unwrap(), &vehicle, ("accepted", "0")).unwrap();
+    let clean =
+        own_tires(&drive(&car, &[], DURATION_S, 32).unwrap(), &vehicle, None, ("accepted", "0")).unwrap();
     let later = of(&drive(&car, &lag, DURATION_S, 33).unwrap(), &clean);
     assert!(!invisible(&later));
     assert_eq!(named(&later)[0], "steering_lag", "{}", text(&later));
