@@ -31,6 +31,7 @@ ARGUMENTS = [
     ("prior_mu", "", "publish this friction prior"),
     ("camera", "false", "use the camera's pictures for the friction prior"),
     ("gap", "false", "diagnose the gap too"),
+    ("drive", "", "drive the car, too: a parameter file of the node driver, its track among them"),
 ]
 
 
@@ -52,6 +53,8 @@ def check(value: dict) -> None:
     for name in ("vehicle", "params"):
         if not Path(value[name]).is_file():
             raise RuntimeError(f"{name}:={value[name]}: no such file")
+    if value["drive"] and not Path(value["drive"]).is_file():
+        raise RuntimeError(f"drive:={value['drive']}: no such file")
     if value["bag"] and not Path(value["bag"]).exists():
         raise RuntimeError(f"bag:={value['bag']}: no such bag")
 
@@ -108,6 +111,9 @@ def nodes(context):
         # The diagnosis never stands in the way of the other nodes.
         topics_in = [("sequence", "telemetry/sequence"), ("pacejka", "identifier/pacejka")]
         started.append(node("gap_diagnosis", topics_in, prefix="nice -n 10"))
+    if value["drive"]:
+        topics_in = [*remaps("odom", "drive"), ("pacejka", "identifier/pacejka"), ("grip", "identifier/grip")]
+        started.append(node("driver", topics_in, defaults=[value["drive"]]))
     if value["bag"]:
         player = Node(
             package="gripsight_bag_player",

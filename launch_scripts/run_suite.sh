@@ -16,6 +16,7 @@ Usage: launch_scripts/run_suite.sh --vehicle FILE [options]
   --camera          use the camera's pictures for the friction prior (params/camera_prior.yaml)
   --namespace NAME  the car's name, where several share a domain: nodes and the stack's topics are below it (/NAME/odom)
   --gap             diagnose the gap too (node gap_diagnosis)
+  --drive FILE      drive the car, too: parameters of the node driver (its track among them)
   --bin FOLDER      where the nodes' binaries are                                      [target/release]
   -h, --help        this text
 
@@ -29,7 +30,7 @@ TEXT
 }
 
 root=$(cd "$(dirname "$0")/.." && pwd)
-vehicle='' stack=gripsight params=$root/params/suite.yaml bag='' rate=1.0 linger=20 prior='' camera=false gap=false
+vehicle='' stack=gripsight params=$root/params/suite.yaml bag='' rate=1.0 linger=20 prior='' camera=false gap=false drive=''
 bin=$root/target/release space=''
 fail() { printf 'run_suite: %s\n' "$1" >&2; exit "${2:-2}"; }
 while (($#)); do
@@ -47,6 +48,7 @@ while (($#)); do
         --rate) rate=$2 ;;
         --linger) linger=$2 ;;
         --prior-mu) prior=$2 ;;
+        --drive) drive=$2 ;;
         --namespace) space=${2#/} ;;
         --bin) bin=$2 ;;
         *) fail "unknown option '$1' (see --help)" ;;
@@ -56,6 +58,7 @@ done
 [[ -n $vehicle ]] || fail "--vehicle is missing: params/vehicles holds examples"
 if [[ ! -f $stack ]]; then stack=$root/params/stacks/$stack.yaml; fi
 for file in "$vehicle" "$stack" "$params"; do [[ -f $file ]] || fail "no file '$file'"; done
+if [[ -n $drive && ! -f $drive ]]; then fail "no file '$drive'"; fi
 if [[ -n $bag && ! -e $bag ]]; then fail "no bag '$bag'"; fi
 
 # A stack's file maps the suite's topic names to the car's: `odom: /car_state/odom`. What it maps signal by signal, telemetry reads itself.
@@ -78,6 +81,7 @@ moved() {
 nodes=(telemetry s4_residual identifier)
 if $camera || [[ -n $prior ]]; then nodes+=(camera_prior); fi
 if $gap; then nodes+=(gap_diagnosis); fi
+if [[ -n $drive ]]; then nodes+=(driver); fi
 if [[ -n $bag ]]; then nodes+=(bag_player); fi
 # What is missing is told before anything has started.
 for node in "${nodes[@]}"; do
@@ -155,6 +159,11 @@ if $gap; then
     # The diagnosis never stands in the way of the other nodes.
     priority=(nice -n 10)
     start gap_diagnosis -r sequence:=telemetry/sequence -r pacejka:=identifier/pacejka "${replay[@]}"
+fi
+if [[ -n $drive ]]; then
+    # The car waits for nobody.
+    priority=()
+    start driver --params-file "$drive" "${motion[@]}" -r pacejka:=identifier/pacejka -r grip:=identifier/grip
 fi
 if [[ -z $bag ]]; then
     wait_for none

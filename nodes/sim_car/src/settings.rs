@@ -1,7 +1,12 @@
 //! The node's parameters, as a scenario.
 
-use anyhow::bail;
-use gripsight_reference_car::{CarParameters, Course, DriverKind, EffectSetting, Friction, Scenario};
+use std::fmt::Write as _;
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use gripsight_reference_car::{
+    CarParameters, Course, DriverKind, EffectSetting, Friction, GRAVITY_MPS2, Scenario, Track,
+};
 use gripsight_runtime::{Descriptor, Node, Parameter};
 
 /// Longest run: the scenario must have an end, the node has none.
@@ -52,6 +57,12 @@ impl Settings {
             "Load transfers, relaxation and combined slip at the car's own size",
         )?;
         let publish_clock = flag(node, "publish_clock", false, "Publish /clock")?;
+        let folder = text(
+            node,
+            "write_folder",
+            "",
+            "Folder for track.csv, vehicle.yaml and driver.yaml, as the node driver takes them; empty: none",
+        )?;
         let mut number = |name: &str, default: f64, low: f64, high: f64, meaning: &str| {
             node.parameter(name, default, Descriptor::new(meaning).range(low..=high).read_only())
                 .map(|p| p.get())
@@ -81,6 +92,9 @@ impl Settings {
 
         let car = CarParameters::by_name(&car)?;
         let course = Course::by_name(&track, &car, reverse)?;
+        if !folder.is_empty() {
+            data_sheet(Path::new(&folder), &car, &track, reverse)?;
+        }
         let (wheel, kind) = match driver.as_str() {
             "topic" => (Wheel::Topic, DriverKind::PurePursuit),
             "pure_pursuit" => (Wheel::Own, DriverKind::PurePursuit),
@@ -103,4 +117,36 @@ impl Settings {
         sensors.camera_rate_hz = camera_rate_hz;
         Ok(Self { scenario: scenario.sensors(sensors), wheel, rate, publish_clock, command_timeout_s })
     }
+}
+
+/// Points of the track that are left out between two of the file.
+const EVERY: usize = 8;
+
+/// What a team knows of its car and its track, as files.
+fn data_sheet(folder: &Path, car: &CarParameters, track: &str, reversed: bool) -> anyhow::Result<()> {
+    let line = Track::by_name(track, car.track_scale, reversed)?;
+    let width_m = line.half_width_m();
+    let mut rows = String::from("x_m,y_m,w_tr_right_m,w_tr_left_m\n");
+    for point in line.points().iter().step_by(EVERY) {
+        let _ = writeln!(rows, "{},{},{width_m},{width_m}", point.x_m, point.y_m);
+    }
+    std::fs::create_dir_all(folder).with_context(|| format!("folder {}", folder.display()))?;
+    let folder = folder.canonicalize().with_context(|| format!("folder {}", folder.display()))?;
+    let drive = &car.drive;
+    let driver = format!(
+        "/**/driver:\n  ros__parameters:\n    track: {}\n    drive_mps2: {:?}\n    brake_mps2: {:?}\n    power_w_per_kg: {:?}\n    top_speed_mps: {:?}\n",
+        folder.join("track.csv").display(),
+        drive.drive_limit * GRAVITY_MPS2,
+        drive.brake_limit * GRAVITY_MPS2,
+        drive.power_w / car.mass_kg,
+        car.top_speed_mps,
+    );
+    // The driver's file last: whoever waits for it finds the others.
+    for (name, text) in
+        [("track.csv", rows), ("vehicle.yaml", car.vehicle_file(&car.name)), ("driver.yaml", driver)]
+    {
+        let path = folder.join(name);
+        std::fs::write(&path, text).with_context(|| format!("file {}", path.display()))?;
+    }
+    Ok(())
 }

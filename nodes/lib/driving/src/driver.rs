@@ -10,13 +10,15 @@
 
 use std::collections::VecDeque;
 
-use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
+use gripsight_vehicle::VehicleParameters;
 
 use crate::governor::Governor;
-use crate::profile::{Drivetrain, Limits, SpeedProfile};
+use crate::plan::Plan;
+use crate::profile::{Drivetrain, SpeedProfile};
+use crate::progress::Progress;
 use crate::pursuit::{Moment, Pursuit};
 use crate::state::{Asked, CarState, DriveCommand, predict};
-use crate::tires::{SteeringTable, TireSet, Trust, with_peak};
+use crate::tires::{TireSet, Trust};
 use crate::{Actuator, DrivingError, Place, Track};
 
 /// How boldly to drive.
@@ -53,6 +55,8 @@ impl Default for Settings {
 const PROMPT_S: f64 = 0.004;
 /// Longest delay that is made up for.
 const LATEST_S: f64 = 0.5;
+/// Oldest state that is made up for: beyond, the clocks differ.
+const OLDEST_S: f64 = 0.2;
 /// Share of the most likely peak to explore up to, where it was not reached.
 const LIKELY: f64 = 0.96;
 /// Share of what the road gave when the car slid, to go on with.
@@ -67,16 +71,6 @@ const LEAST_DRIVE: f64 = 0.5;
 const SLIDE_MPS2: f64 = 0.5;
 /// Share of the half width from which the car slows down.
 const WIDE: f64 = 0.6;
-
-/// What is planned with.
-#[derive(Debug, Clone)]
-struct Plan {
-    tires: PacejkaParameters,
-    grip: f64,
-    limits: Limits,
-    profile: SpeedProfile,
-    table: SteeringTable,
-}
 
 /// Drives a car around a track.
 #[derive(Debug, Clone)]
@@ -95,6 +89,7 @@ pub struct Driver {
     actuator: Actuator,
     plan: Plan,
     governor: Governor,
+    progress: Progress,
     trim_rad: f64,
     place: Option<Place>,
     asked: VecDeque<Asked>,
@@ -114,6 +109,7 @@ impl Driver {
     ) -> Result<Self, DrivingError> {
         start.check()?;
         let plan = Plan::new(&vehicle, &drivetrain, &track, &start.tires, settings.share * start.grip());
+        let progress = Progress::new(track.length_m(), plan.grip);
         Ok(Self {
             actuator: start.actuator,
             vehicle,
@@ -127,6 +123,7 @@ impl Driver {
             caught: None,
             plan,
             governor: Governor::default(),
+            progress,
             trim_rad: 0.0,
             place: None,
             asked: VecDeque::new(),
@@ -162,16 +159,22 @@ impl Driver {
         self.catch(CAUGHT * left * promised);
     }
 
-    /// Tells the driver that a part of the lap with all kinds of corners has been driven: what was planned for it is what was driven.
-    pub fn driven(&mut self) {
-        self.caught = self.caught.map(|grip| grip * REGAINED);
-        self.driven = self.plan.grip;
+    /// Half laps driven: times to look whether there is something new to learn.
+    #[must_use]
+    pub fn halves(&self) -> usize {
+        self.progress.halves()
     }
 
     /// Grip (acceleration over g) that is planned with.
     #[must_use]
     pub fn grip(&self) -> f64 {
         self.plan.grip
+    }
+
+    /// Deceleration that is planned with.
+    #[must_use]
+    pub fn brake_mps2(&self) -> f64 {
+        self.plan.limits.brake_mps2
     }
 
     /// Whether the plan is held back by a slide or a warning.
@@ -204,8 +207,9 @@ impl Driver {
         self.place
     }
 
-    /// The next command, from a state in the order of stamps. A state that is not finite gives the last steering and full braking.
-    pub fn command(&mut self, state: &CarState) -> DriveCommand {
+    /// The next command, from a state in the order of stamps. It goes out at `now_s` of the same clock, a little after the state was
+    /// measured. A state that is not finite gives the last steering and full braking.
+    pub fn command(&mut self, state: &CarState, now_s: f64) -> DriveCommand {
         if !state.is_finite() {
             let steering_rad = self.asked.back().map_or(0.0, |a| self.actuated(a.angle_rad));
             return DriveCommand {
@@ -216,10 +220,24 @@ impl Driver {
         }
         let place = self.track.place(state.x_m, state.y_m, self.place.map(|p| p.station_m));
         self.place = Some(place);
+        // A clock that went back: what was asked then says nothing of what acts now.
+        let age_s = (now_s - state.stamp_s).clamp(0.0, OLDEST_S);
+        let from_s = state.stamp_s + age_s;
+        if self.asked.back().is_some_and(|a| a.from_s > from_s) {
+            self.asked.clear();
+            self.governor.reset();
+        }
+        if let Some(driven) = self.progress.pass(place, self.plan.grip) {
+            self.driven = driven;
+            if let Some(caught) = self.caught {
+                self.caught = Some(caught * REGAINED);
+                self.renew();
+            }
+        }
         self.watch(state);
         let delay_s = self.actuator.delay_s.min(LATEST_S);
-        let (car, then) = if delay_s > PROMPT_S {
-            let car = predict(state, delay_s, &self.asked, &self.vehicle, &self.plan.tires);
+        let (car, then) = if age_s + delay_s > PROMPT_S {
+            let car = predict(state, (age_s, delay_s), &self.asked, &self.vehicle, &self.plan.tires);
             (car, self.track.place(car.x_m, car.y_m, Some(place.station_m)))
         } else {
             (*state, place)
@@ -229,14 +247,14 @@ impl Driver {
             place: then,
             track: &self.track,
             table: &self.plan.table,
-            dt_s: self.asked.back().map_or(0.0, |a| state.stamp_s - a.from_s),
+            dt_s: self.asked.back().map_or(0.0, |a| from_s - a.from_s),
             wheelbase_m: self.vehicle.wheelbase_m(),
             l_f_m: self.vehicle.l_f_m,
         };
         let most = self.vehicle.max_steering_rad;
         let angle_rad = self.settings.pursuit.steering_rad(&moment, &mut self.trim_rad).clamp(-most, most);
         let (speed_mps, acceleration_mps2) = self.longitudinal(state, place, angle_rad);
-        let asked = Asked { from_s: state.stamp_s, angle_rad, acceleration_mps2 };
+        let asked = Asked { from_s, angle_rad, acceleration_mps2 };
         self.asked.push_back(asked);
         while self.asked.front().is_some_and(|a| a.from_s < state.stamp_s - 2.0 * LATEST_S) {
             self.asked.pop_front();
@@ -318,28 +336,7 @@ impl Driver {
         let base = self.known.as_ref().or(self.prior.as_ref()).unwrap_or(&self.start);
         let tires = base.tires;
         self.plan = Plan::new(&self.vehicle, &self.drivetrain, &self.track, &tires, self.allowed());
+        self.progress.planned(self.plan.grip);
         self.governor.reset();
-    }
-}
-
-impl Plan {
-    /// The tires with their weaker peak a little above what is planned, so that the plan stays below it.
-    fn new(
-        vehicle: &VehicleParameters,
-        drivetrain: &Drivetrain,
-        track: &Track,
-        tires: &PacejkaParameters,
-        grip: f64,
-    ) -> Self {
-        let peak = tires.front.d.min(tires.rear.d).max(grip);
-        let tires = if grip > 0.9 * peak { with_peak(tires, peak) } else { with_peak(tires, grip / 0.9) };
-        let limits = Limits::new(vehicle, grip, drivetrain);
-        Self {
-            profile: SpeedProfile::new(track, &limits),
-            table: SteeringTable::new(vehicle, &tires),
-            tires,
-            grip,
-            limits,
-        }
     }
 }

@@ -6,7 +6,9 @@
 mod driver;
 mod error;
 mod governor;
+mod plan;
 mod profile;
+mod progress;
 mod pursuit;
 mod spline;
 mod state;

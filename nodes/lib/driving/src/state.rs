@@ -56,10 +56,10 @@ pub(crate) struct Asked {
     pub(crate) acceleration_mps2: f64,
 }
 
-/// The car `ahead_s` later, by the single-track model with the commands that are still on their way.
+/// The car `age_s + delay_s` later, by the single-track model with the commands that are still on their way: each acts `delay_s` after it was asked.
 pub(crate) fn predict(
     now: &CarState,
-    ahead_s: f64,
+    (age_s, delay_s): (f64, f64),
     asked: &VecDeque<Asked>,
     vehicle: &VehicleParameters,
     tires: &PacejkaParameters,
@@ -68,11 +68,12 @@ pub(crate) fn predict(
     const SUBSTEP_S: f64 = 0.002;
     let car = SingleTrack::new(vehicle, tires);
     let mut at = *now;
+    let ahead_s = age_s + delay_s;
     let steps = (ahead_s / STEP_S).ceil();
     let dt_s = ahead_s / steps.max(1.0);
     for _ in 0..steps as usize {
         // What acts at this instant was asked one delay before.
-        let then_s = at.stamp_s - ahead_s;
+        let then_s = at.stamp_s - delay_s;
         let acting = asked.iter().rev().find(|a| a.from_s <= then_s + 1e-9);
         let acting = acting.or_else(|| asked.front());
         let (angle_rad, a_x) = acting.map_or((0.0, 0.0), |a| (a.angle_rad, a.acceleration_mps2));

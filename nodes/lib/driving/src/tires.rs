@@ -88,7 +88,13 @@ impl TireSet {
     /// The tires that a stack starts from where nothing is known: the paper's mismatched start, D = 0.51.
     #[must_use]
     pub fn start() -> Self {
-        let axle = MagicFormula::from_stiffness(6.0, 1.4, 0.51, 0.0);
+        Self::start_at(0.51)
+    }
+
+    /// The same at another friction.
+    #[must_use]
+    pub fn start_at(friction: f64) -> Self {
+        let axle = MagicFormula::from_stiffness(6.0, 1.4, friction, 0.0);
         Self::assumed(PacejkaParameters { front: axle, rear: axle })
     }
 

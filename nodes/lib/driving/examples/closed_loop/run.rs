@@ -137,15 +137,18 @@ pub(crate) fn drive(case: &Case, variant: Variant, verbose: bool) -> Result<Run>
                 learner.push(&sample, &mut driver)?;
             }
             if let SensorSample::Odometry(s) = sample {
-                let command = driver.command(&CarState {
-                    stamp_s: s.stamp_s,
-                    x_m: s.x_m,
-                    y_m: s.y_m,
-                    heading_rad: s.heading_rad,
-                    v_x_mps: s.v_x_mps,
-                    v_y_mps: s.v_y_mps,
-                    yaw_rate_radps: s.yaw_rate_radps,
-                });
+                let command = driver.command(
+                    &CarState {
+                        stamp_s: s.stamp_s,
+                        x_m: s.x_m,
+                        y_m: s.y_m,
+                        heading_rad: s.heading_rad,
+                        v_x_mps: s.v_x_mps,
+                        v_y_mps: s.v_y_mps,
+                        yaw_rate_radps: s.yaw_rate_radps,
+                    },
+                    s.stamp_s,
+                );
                 sim.command(Command {
                     steering_rad: command.steering_rad,
                     speed_mps: command.speed_mps,
@@ -165,16 +168,14 @@ pub(crate) fn drive(case: &Case, variant: Variant, verbose: bool) -> Result<Run>
             wreck = Some("too slow");
             break;
         }
-        let half = 2 * referee.laps.len() + usize::from(referee.share() > 0.5);
-        if half > halves {
-            halves = half;
-            driver.driven();
+        if driver.halves() > halves {
+            halves = driver.halves();
             if let Some(learner) = &mut learner {
                 learner.identify(&mut driver, verbose)?;
             }
             if verbose {
                 eprintln!(
-                    "  {:.1} s, half lap {half}: planned {:.3} of {:.3}, {}{}",
+                    "  {:.1} s, half lap {halves}: planned {:.3} of {:.3}, {}{}",
                     sim.time_s(),
                     driver.grip(),
                     truth.grip(),
@@ -217,11 +218,6 @@ impl<'a> Referee<'a> {
             outside: false,
             slow: 0,
         }
-    }
-
-    /// Share of the lap.
-    fn share(&self) -> f64 {
-        self.station_m / self.track.length_m()
     }
 
     /// The reason for which the run cannot go on.

@@ -57,7 +57,7 @@ fn drive(driver: &mut Driver, grip: impl Fn(f64) -> f64, delay_s: f64, duration_
     let mut commands = vec![DriveCommand::default(); late];
     let mut worst_m = 0.0_f64;
     for step in 0..(duration_s / DT_S) as usize {
-        commands.push(driver.command(&car));
+        commands.push(driver.command(&car, car.stamp_s));
         let (steering, a_x) = (commands[step].steering_rad, commands[step + late].acceleration_mps2);
         let model = SingleTrack::new(&vehicle, &tires(grip(car.stamp_s)));
         let input = Input { v_x_mps: car.v_x_mps, steering_rad: steering };
@@ -125,7 +125,7 @@ fn sets_are_taken_for_what_they_are_good_for() {
 
     // It is not: a step beyond what was driven, but not beyond what is likely.
     let mut within = driver(TireSet::start());
-    within.driven();
+    drive(&mut within, |_| 0.8, 0.0, 25.0);
     within.take(set(0.48, Trust::AcceptedWithin)).unwrap();
     approx::assert_relative_eq!(within.grip(), settings.step * start, max_relative = 1e-2);
     within.take(TireSet { likely_peak: Some(0.55), ..set(0.48, Trust::AcceptedWithin) }).unwrap();
@@ -134,7 +134,7 @@ fn sets_are_taken_for_what_they_are_good_for() {
     // A prior that promises more: a larger step and no more than that. One that promises less is no reason to slow down.
     for (prior, expected) in [(2.0, settings.prior_step * start), (0.3, settings.step * start)] {
         let mut driver = driver(TireSet::start());
-        driver.driven();
+        drive(&mut driver, |_| 0.8, 0.0, 25.0);
         driver.take(set(0.48, Trust::AcceptedWithin)).unwrap();
         driver.take(set(prior, Trust::Provisional)).unwrap();
         approx::assert_relative_eq!(driver.grip(), expected, max_relative = 1e-2);
@@ -173,6 +173,6 @@ fn nonsense_changes_nothing() {
         v_y_mps: 0.0,
         yaw_rate_radps: 0.0,
     };
-    let command = driver.command(&lost);
+    let command = driver.command(&lost, 0.0);
     assert!(command.acceleration_mps2 < 0.0 && command.speed_mps == 0.0);
 }

@@ -34,15 +34,18 @@ fn on_its_projected_tires_the_1_10_car_stays_on_the_track() {
         sim.step().unwrap();
         for sample in sim.drain().0 {
             let SensorSample::Odometry(s) = sample else { continue };
-            let command = driver.command(&CarState {
-                stamp_s: s.stamp_s,
-                x_m: s.x_m,
-                y_m: s.y_m,
-                heading_rad: s.heading_rad,
-                v_x_mps: s.v_x_mps,
-                v_y_mps: s.v_y_mps,
-                yaw_rate_radps: s.yaw_rate_radps,
-            });
+            let command = driver.command(
+                &CarState {
+                    stamp_s: s.stamp_s,
+                    x_m: s.x_m,
+                    y_m: s.y_m,
+                    heading_rad: s.heading_rad,
+                    v_x_mps: s.v_x_mps,
+                    v_y_mps: s.v_y_mps,
+                    yaw_rate_radps: s.yaw_rate_radps,
+                },
+                s.stamp_s,
+            );
             sim.command(Command {
                 steering_rad: command.steering_rad,
                 speed_mps: command.speed_mps,

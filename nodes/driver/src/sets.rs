@@ -1,0 +1,84 @@
+//! The identifier's messages as the driver takes them.
+
+use gripsight_driving::{Actuator, TireSet, Trust};
+use gripsight_msgs::{MagicFormula as FormulaMessage, PacejkaParams};
+use gripsight_vehicle::{MagicFormula, PacejkaParameters};
+
+/// What a message says to a driver.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Said {
+    /// A set to drive on.
+    Set(TireSet),
+    /// The set in use must not be used any longer.
+    Withdrawn,
+    /// Nothing that concerns this driver, and why.
+    Nothing(&'static str),
+}
+
+/// Reads a message. Sets of another car say nothing, nor does what is no end of a run.
+pub(crate) fn read(message: &PacejkaParams, vehicle_hash: &str, provisional: bool) -> Said {
+    if message.handshake.vehicle_hash != vehicle_hash {
+        return Said::Nothing("of a car with other parameters");
+    }
+    let trust = match message.status {
+        PacejkaParams::ACCEPTED => Trust::Accepted,
+        PacejkaParams::ACCEPTED_WITHIN => Trust::AcceptedWithin,
+        PacejkaParams::PROVISIONAL if provisional => Trust::Provisional,
+        PacejkaParams::PROVISIONAL => return Said::Nothing("provisional, and take_provisional is false"),
+        PacejkaParams::WITHDRAWN => return Said::Withdrawn,
+        _ => return Said::Nothing("neither accepted nor withdrawn"),
+    };
+    let likely = message.front_peak.friction.value.min(message.rear_peak.friction.value);
+    let signals = &message.signals;
+    Said::Set(TireSet {
+        tires: PacejkaParameters { front: formula(&message.front), rear: formula(&message.rear) },
+        trust,
+        valid_slip_rad: [message.front_valid_slip_rad, message.rear_valid_slip_rad],
+        likely_peak: Some(likely).filter(|peak| peak.is_finite()),
+        actuator: Actuator {
+            delay_s: signals.steering_delay_s.max(0.0),
+            gain: signals.steering_gain,
+            offset_rad: signals.steering_offset_rad,
+        },
+    })
+}
+
+fn formula(m: &FormulaMessage) -> MagicFormula {
+    MagicFormula { b: m.b, c: m.c, d: m.d, e: m.e }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(status: u8) -> PacejkaParams {
+        let axle = FormulaMessage { b: 8.0, c: 1.4, d: 0.8, e: 0.0 };
+        let mut message = PacejkaParams { status, front: axle, rear: axle, ..PacejkaParams::default() };
+        message.handshake.vehicle_hash = "a".to_owned();
+        (message.front_peak.friction.value, message.rear_peak.friction.value) = (0.9, 0.85);
+        (message.front_valid_slip_rad, message.rear_valid_slip_rad) = (0.1, f64::NAN);
+        (message.signals.steering_delay_s, message.signals.steering_gain) = (-0.001, 1.1);
+        message
+    }
+
+    #[test]
+    fn a_set_comes_with_what_it_is_good_for() {
+        let Said::Set(set) = read(&message(PacejkaParams::ACCEPTED_WITHIN), "a", false) else { panic!() };
+        assert_eq!((set.trust, set.likely_peak), (Trust::AcceptedWithin, Some(0.85)));
+        assert_eq!((set.actuator.delay_s, set.actuator.gain), (0.0, 1.1));
+        assert_eq!(set.grip(), set.tires.front.max_force_within(0.1));
+        set.check().unwrap();
+    }
+
+    #[test]
+    fn other_messages_are_told_apart() {
+        let read = |status: u8, hash: &str, provisional: bool| read(&message(status), hash, provisional);
+        assert_eq!(read(PacejkaParams::WITHDRAWN, "a", false), Said::Withdrawn);
+        assert!(matches!(read(PacejkaParams::WITHDRAWN, "b", false), Said::Nothing(_)));
+        assert!(matches!(read(PacejkaParams::PROPOSED, "a", true), Said::Nothing(_)));
+        assert!(matches!(read(PacejkaParams::REJECTED, "a", true), Said::Nothing(_)));
+        assert!(matches!(read(PacejkaParams::PROVISIONAL, "a", false), Said::Nothing(_)));
+        let Said::Set(set) = read(PacejkaParams::PROVISIONAL, "a", true) else { panic!() };
+        assert_eq!(set.trust, Trust::Provisional);
+    }
+}

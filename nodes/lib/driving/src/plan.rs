@@ -1,0 +1,39 @@
+//! What a grip and a set of tires let the driver plan.
+
+use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
+
+use crate::Track;
+use crate::profile::{Drivetrain, Limits, SpeedProfile};
+use crate::tires::{SteeringTable, with_peak};
+
+/// What is planned with.
+#[derive(Debug, Clone)]
+pub(crate) struct Plan {
+    pub(crate) tires: PacejkaParameters,
+    pub(crate) grip: f64,
+    pub(crate) limits: Limits,
+    pub(crate) profile: SpeedProfile,
+    pub(crate) table: SteeringTable,
+}
+
+impl Plan {
+    /// The tires with their weaker peak a little above what is planned, so that the plan stays below it.
+    pub(crate) fn new(
+        vehicle: &VehicleParameters,
+        drivetrain: &Drivetrain,
+        track: &Track,
+        tires: &PacejkaParameters,
+        grip: f64,
+    ) -> Self {
+        let peak = tires.front.d.min(tires.rear.d).max(grip);
+        let tires = if grip > 0.9 * peak { with_peak(tires, peak) } else { with_peak(tires, grip / 0.9) };
+        let limits = Limits::new(vehicle, grip, drivetrain);
+        Self {
+            profile: SpeedProfile::new(track, &limits),
+            table: SteeringTable::new(vehicle, &tires),
+            tires,
+            grip,
+            limits,
+        }
+    }
+}

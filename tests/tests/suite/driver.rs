@@ -1,0 +1,102 @@
+//! The loop over topics: the driver at the wheel of the live car, tire sets from a peer.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use gripsight_identification::vehicle_hash;
+use gripsight_msgs::PacejkaParams;
+use gripsight_tests::domain::Domain;
+use gripsight_tests::peers::{PATIENCE, available, cyclone, start_cyclone};
+use gripsight_tests::process::{Process, node};
+use gripsight_vehicle::VehicleParameters;
+use serde_json::json;
+
+const SET: &str = "gripsight_msgs/msg/PacejkaParams";
+/// Two laps at the start's speed, on a busy machine.
+const LAPS: Duration = Duration::from_secs(60);
+
+/// Publishes a set as the identifier would.
+fn publish(domain: &Domain, python: &Path, hash: &str, status: u8) {
+    // The plant's on a road of 0.9, projected on Phi_p.
+    let front = json!({"b": 9.68, "c": 1.041, "d": 0.830, "e": -0.876});
+    let rear = json!({"b": 11.72, "c": 1.0, "d": 0.857, "e": -0.738});
+    let peak = json!({"friction": {"value": 0.83, "low": 0.8, "high": 0.86}, "reached": true});
+    let set = json!({
+        "handshake": {"vehicle_hash": hash, "sequence_id": 7}, "status": status, "reason": "as a peer says",
+        "front": front, "rear": rear, "front_peak": peak, "rear_peak": peak, "signals": {"steering_gain": 1.0}
+    });
+    let mut peer =
+        start_cyclone(domain, python, &["publish", "/identifier/pacejka", SET, "--qos", "latched"]);
+    peer.feed(&set.to_string());
+    assert!(peer.wait(PATIENCE).success());
+}
+
+#[test]
+fn the_driver_laps_the_live_car_takes_a_set_and_slows_when_it_is_withdrawn() {
+    let cyclone = cyclone();
+    if !available(std::slice::from_ref(&cyclone)) {
+        return;
+    }
+    let python = cyclone.unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let domain = Domain::new();
+    let write = format!("write_folder:={}", folder.path().display());
+    let car = node(&domain, "sim_car", &["-p", "mu:=0.9", "-p", &write]);
+    car.wait_for_log("f1tenth on its track", PATIENCE);
+    let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (vehicle, parameters) = (file("vehicle.yaml"), file("driver.yaml"));
+    let driver = node(
+        &domain,
+        "driver",
+        &[
+            "--params-file",
+            &vehicle,
+            "--params-file",
+            &parameters,
+            "-r",
+            "pacejka:=identifier/pacejka",
+            "-r",
+            "grip:=identifier/grip",
+        ],
+    );
+    // The car rolls straight on until the first command reaches it: that lap shows nothing.
+    lap(&driver);
+    let slow = lap(&driver);
+    assert_eq!(slow.exits, 0, "off the track on the start's tires");
+
+    let text = std::fs::read_to_string(&vehicle).unwrap();
+    let hash = vehicle_hash(&VehicleParameters::from_ros_yaml(&text).unwrap());
+    publish(&domain, &python, "of another car", PacejkaParams::ACCEPTED);
+    driver.wait_for_log("of a car with other parameters", PATIENCE);
+    publish(&domain, &python, &hash, PacejkaParams::ACCEPTED);
+    driver.wait_for_log("Accepted: planning with a grip of 0.8", PATIENCE);
+    lap(&driver);
+    let fast = lap(&driver);
+    assert!(fast.time_s < 0.9 * slow.time_s, "{} s after {} s", fast.time_s, slow.time_s);
+    assert_eq!(fast.exits, 0, "off the track on its own tires");
+
+    let told = Instant::now();
+    publish(&domain, &python, &hash, PacejkaParams::WITHDRAWN);
+    driver.wait_for_log("is withdrawn, planning with a grip of 0.5", PATIENCE);
+    assert!(told.elapsed() < Duration::from_secs(3), "{:?} with the peer's own start", told.elapsed());
+    lap(&driver);
+    let last = lap(&driver);
+    // The root of the grips' ratio is 1.2; on the straights the motor is the limit.
+    assert!(last.time_s > 1.1 * fast.time_s, "{} s after {} s", last.time_s, fast.time_s);
+}
+
+struct Lap {
+    time_s: f64,
+    exits: u32,
+}
+
+/// The driver's line about its next lap.
+fn lap(driver: &Process) -> Lap {
+    let line = driver.wait_for_log("to the line", LAPS);
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let before = |unit: &str| {
+        let at = words.iter().position(|w| *w == unit).unwrap();
+        words[at - 1].parse::<f64>().unwrap()
+    };
+    Lap { time_s: before("s,"), exits: before("times") as u32 }
+}
