@@ -109,7 +109,7 @@ def nodes(context):
         started.append(node("camera_prior", input="none", configured_mu=float(value["prior_mu"])))
     if value["gap"] == "true":
         # The diagnosis never stands in the way of the other nodes.
-        topics_in = [("sequence", "telemetry/sequence"), ("pacejka", "identifier/pacejka")]
+        topics_in = [("sequence", "telemetry/sequence"), ("posterior", "identifier/posterior")]
         started.append(node("gap_diagnosis", topics_in, prefix="nice -n 10"))
     if value["drive"]:
         topics_in = [*remaps("odom", "drive"), ("pacejka", "identifier/pacejka"), ("grip", "identifier/grip")]

@@ -150,7 +150,7 @@ start s4_residual "${motion[@]}" -r sequence:=telemetry/sequence -r candidate:=i
 start identifier "${motion[@]}" -r sequence:=telemetry/sequence -r model:=s4_residual/model -r friction:=camera_prior/friction "${replay[@]}"
 if $camera; then
     defaults=(--params-file "$root/params/camera_prior.yaml")
-    start camera_prior "${eyes[@]}" -r pacejka:=identifier/pacejka "${replay[@]}"
+    start camera_prior "${eyes[@]}" -r posterior:=identifier/posterior "${replay[@]}"
     defaults=()
 elif [[ -n $prior ]]; then
     start camera_prior -p input:=none -p "configured_mu:=$prior" "${replay[@]}"
@@ -158,7 +158,7 @@ fi
 if $gap; then
     # The diagnosis never stands in the way of the other nodes.
     priority=(nice -n 10)
-    start gap_diagnosis -r sequence:=telemetry/sequence -r pacejka:=identifier/pacejka "${replay[@]}"
+    start gap_diagnosis -r sequence:=telemetry/sequence -r posterior:=identifier/posterior "${replay[@]}"
 fi
 if [[ -n $drive ]]; then
     # The car waits for nobody.

@@ -30,6 +30,7 @@ const DEFINITIONS: &[(&str, &str)] = definitions! {
         "ResidualModel"
         "SignalCorrections"
         "StateSequence"
+        "TirePosterior"
     }
     "standard/ackermann_msgs": "ackermann_msgs" { "AckermannDrive" "AckermannDriveStamped" }
     "standard/builtin_interfaces": "builtin_interfaces" { "Duration" "Time" }

@@ -10,7 +10,7 @@ use gripsight_msgs::standard::{
 };
 use gripsight_msgs::{
     Excitation, FrictionPrior, GapReport, Grip, IdentificationProgress, Message, PacejkaParams, Residual,
-    ResidualModel, StateSequence, definition, schema, type_names,
+    ResidualModel, StateSequence, TirePosterior, definition, schema, type_names,
 };
 use serde_reflection::{ContainerFormat, Format, Named, Registry, Tracer, TracerConfig};
 
@@ -30,6 +30,7 @@ fn registry() -> Registry {
         Residual,
         ResidualModel,
         StateSequence,
+        TirePosterior,
         ackermann_msgs::AckermannDriveStamped,
         builtin_interfaces::Duration,
         diagnostic_msgs::DiagnosticArray,

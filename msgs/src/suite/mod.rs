@@ -14,4 +14,4 @@ pub use gap::{GapEffect, GapParameter, GapRegion, GapReport};
 pub use progress::IdentificationProgress;
 pub use residual::{Residual, ResidualModel};
 pub use sequence::{Excitation, StateSequence};
-pub use tires::{Grip, MagicFormula, PacejkaParams, PeakFriction, SignalCorrections};
+pub use tires::{Grip, MagicFormula, PacejkaParams, PeakFriction, SignalCorrections, TirePosterior};

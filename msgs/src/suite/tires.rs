@@ -123,6 +123,32 @@ impl Message for PacejkaParams {
     const TYPE: &'static str = "gripsight_msgs/msg/PacejkaParams";
 }
 
+/// The tires of the car with its load transfer, combined slip and relaxation (not those of a bare single-track model: these are in [`PacejkaParams`]),
+/// fitted together with these, and how well a drive knows them. After every run with finite numbers, whatever its status.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TirePosterior {
+    /// Stamp of the last sample of the sequence.
+    pub header: Header,
+    /// Run and sequence of the identification that it was made beside.
+    pub handshake: Handshake,
+    /// accepted, accepted_within, provisional or rejected: that of the run's set; what these tires are worth says their covariance.
+    pub status: String,
+    /// front.b ... rear.e of the Magic Formula; effect.parameter of what every car has a little of.
+    pub names: Vec<String>,
+    /// Unit of each.
+    pub units: Vec<String>,
+    /// Mean of each (unit).
+    pub mean: Vec<f64>,
+    /// Their covariance, row by row (product of the units).
+    pub covariance: Vec<f64>,
+    /// Hashes of the seconds of driving that it was fitted on: on these it is a place to start from, never a prior.
+    pub data: Vec<String>,
+}
+
+impl Message for TirePosterior {
+    const TYPE: &'static str = "gripsight_msgs/msg/TirePosterior";
+}
+
 /// Whether the car still grips as the set in use promises: published as it is watched, at once where it does not.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Grip {

@@ -31,7 +31,7 @@ pub(crate) struct Facts {
     pub(crate) received: usize,
     /// Time of the last one, s.
     pub(crate) took_s: f64,
-    /// Whether tires have arrived on `pacejka`.
+    /// Whether tires have arrived on `posterior`.
     pub(crate) has_tires: bool,
 }
 

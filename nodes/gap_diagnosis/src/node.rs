@@ -7,18 +7,17 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use gripsight_bag::Reassembler;
-use gripsight_diagnosis::{Diagnosis, GapError, Request, diagnose};
+use gripsight_diagnosis::{Diagnosis, Request, diagnose};
 use gripsight_identification::export::stamp_text;
-use gripsight_identification::vehicle_hash;
-use gripsight_msgs::{
-    GapReport, MagicFormula as FormulaMessage, PacejkaParams, StateSequence as SequenceMessage,
-};
+use gripsight_identification::{Usable, vehicle_hash};
+use gripsight_identification_messages as messages;
+use gripsight_msgs::{GapReport, StateSequence as SequenceMessage, TirePosterior as PosteriorMessage};
 use gripsight_report::Header;
 use gripsight_runtime::{
     Descriptor, Diagnostics, Node, Parameter, Publisher, Qos, Subscription, vehicle_parameters,
 };
 use gripsight_signals::StateSequence;
-use gripsight_vehicle::{MagicFormula, PacejkaParameters, VehicleParameters};
+use gripsight_vehicle::{TirePosterior, VehicleParameters};
 use tokio::sync::watch;
 
 use crate::diagnostics::{Facts, Last, status};
@@ -44,7 +43,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
         Descriptor::new("Effects to leave out of the library, by name"),
     )?;
     let sequences = node.subscription::<SequenceMessage>("sequence", Qos::latched().with_depth(64))?;
-    let tires = node.subscription::<PacejkaParams>("pacejka", Qos::latched())?;
+    let tires = node.subscription::<PosteriorMessage>("posterior", Qos::latched())?;
     let output = node.publisher::<GapReport>("~/report", Qos::latched())?;
     let diagnostics = node.diagnostics();
 
@@ -57,13 +56,13 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
             has_tires: false,
         });
         let (newest, sequence) = watch::channel(None);
-        let (accepted, tires_in_use) = watch::channel(None);
+        let (known, tires_known) = watch::channel(None);
         let diagnoser = Diagnoser { vehicle, report_folder, without, output, facts: &facts };
         tokio::select! {
             () = collect_sequences(sequences, newest, &facts) => {}
-            () = collect_tires(tires, accepted, &diagnoser.vehicle, &facts) => {}
+            () = collect_tires(tires, known, &diagnoser.vehicle, &facts) => {}
             () = say(&diagnostics, &facts) => {}
-            () = diagnoser.diagnose_each(sequence, tires_in_use) => {}
+            () = diagnoser.diagnose_each(sequence, tires_known) => {}
         }
         Ok(())
     })
@@ -90,27 +89,22 @@ async fn collect_sequences(
 }
 
 async fn collect_tires(
-    mut messages: Subscription<PacejkaParams>,
-    newest: watch::Sender<Option<PacejkaParameters>>,
+    mut posteriors: Subscription<PosteriorMessage>,
+    newest: watch::Sender<Option<Arc<TirePosterior>>>,
     vehicle: &VehicleParameters,
     facts: &RefCell<Facts>,
 ) {
     let hash = vehicle_hash(vehicle);
-    while let Some(message) = messages.next().await {
-        if message.status != PacejkaParams::ACCEPTED || message.handshake.vehicle_hash != hash {
-            tracing::warn!("tires left out: not accepted, or of a car with other parameters");
-            continue;
+    while let Some(message) = posteriors.next().await {
+        match messages::own_tires(&message) {
+            Ok(posterior) if posterior.vehicle_hash == hash => {
+                facts.borrow_mut().has_tires = true;
+                newest.send_replace(Some(Arc::new(posterior)));
+            }
+            Ok(_) => tracing::warn!("tires left out: of a car with other parameters"),
+            Err(error) => tracing::warn!("tires left out: {error}"),
         }
-        facts.borrow_mut().has_tires = true;
-        newest.send_replace(Some(PacejkaParameters {
-            front: formula(&message.front),
-            rear: formula(&message.rear),
-        }));
     }
-}
-
-fn formula(m: &FormulaMessage) -> MagicFormula {
-    MagicFormula { b: m.b, c: m.c, d: m.d, e: m.e }
 }
 
 async fn say(diagnostics: &Diagnostics, facts: &RefCell<Facts>) {
@@ -130,19 +124,19 @@ struct Diagnoser<'a> {
 }
 
 impl Diagnoser<'_> {
-    /// One diagnosis after the other, each of the newest sequence, against the tires in use.
+    /// One diagnosis after the other, each of the newest sequence, from the car's own tires as the identifier knows them.
     async fn diagnose_each(
         &self,
         mut sequences: watch::Receiver<Option<Arc<StateSequence>>>,
-        tires: watch::Receiver<Option<PacejkaParameters>>,
+        tires: watch::Receiver<Option<Arc<TirePosterior>>>,
     ) {
         while sequences.changed().await.is_ok() {
             let Some(sequence) = sequences.borrow_and_update().clone() else { continue };
             let start = Instant::now();
             // A statement of its own: within the call the guard would be held across the await, and the next set to arrive would block
             // the node's only thread for good.
-            let in_use = *tires.borrow();
-            let result = self.diagnose(Arc::clone(&sequence), in_use).await;
+            let known = tires.borrow().clone();
+            let result = self.diagnose(Arc::clone(&sequence), known).await;
             let mut last = match result {
                 Ok(diagnosis) => self.publish(&diagnosis, &sequence).await,
                 Err(reason) => Last::Failed { reason },
@@ -160,15 +154,21 @@ impl Diagnoser<'_> {
     async fn diagnose(
         &self,
         sequence: Arc<StateSequence>,
-        tires: Option<PacejkaParameters>,
+        posterior: Option<Arc<TirePosterior>>,
     ) -> Result<Diagnosis, String> {
         let (vehicle, without) = (Arc::clone(&self.vehicle), self.without.get());
-        let work = move || -> Result<Diagnosis, GapError> {
-            let request = Request { tires, without: &without, ..Request::new(&sequence, &vehicle) };
-            diagnose(&request, &mut |step| tracing::debug!("{step}"))
+        let work = move || -> anyhow::Result<Diagnosis> {
+            // As offline: what nothing measures is estimated; what contradicts itself stays, to be named.
+            let usable = Usable::measured_or_estimated(&sequence, &vehicle)?;
+            let request = Request {
+                posterior: posterior.as_deref(),
+                without: &without,
+                ..Request::new(&usable.sequence, &vehicle)
+            };
+            Ok(diagnose(&request, &mut |step| tracing::debug!("{step}"))?)
         };
         match tokio::task::spawn_blocking(work).await {
-            Ok(result) => result.map_err(|error| error.to_string()),
+            Ok(result) => result.map_err(|error| format!("{error:#}")),
             Err(error) => Err(format!("the diagnosis ended abnormally: {error}")),
         }
     }

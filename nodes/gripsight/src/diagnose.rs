@@ -8,13 +8,13 @@ use anyhow::{Context, bail};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use gripsight_bag::{ReadReport, Role, TopicMap, read_sequences};
-use gripsight_diagnosis::{Diagnosis, Earlier, ExtendedModelFile, Request, TirePosterior, Verdict, diagnose};
+use gripsight_diagnosis::{Diagnosis, Earlier, ExtendedModelFile, Request, Verdict, diagnose};
 use gripsight_identification::export::{read_tires, stamp_text};
 use gripsight_identification::vehicle_hash;
 use gripsight_model::EffectId;
 use gripsight_report::{Before, GapInput, Header, TopicUse, gap_page, gap_text, topic_uses};
 use gripsight_signals::{Check, StateSequence, WindowConfig};
-use gripsight_vehicle::VehicleParameters;
+use gripsight_vehicle::{TirePosterior, VehicleParameters};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -275,7 +275,9 @@ pub(crate) fn tires(path: &Path) -> anyhow::Result<gripsight_vehicle::PacejkaPar
 /// The car's own tires of a file.
 fn posterior(path: &Path) -> anyhow::Result<TirePosterior> {
     let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    TirePosterior::from_json(&text).with_context(|| format!("cannot use {}", path.display()))
+    let posterior: TirePosterior =
+        serde_json::from_str(&text).with_context(|| format!("cannot use {}", path.display()))?;
+    posterior.checked().with_context(|| format!("cannot use {}", path.display()))
 }
 
 /// The extended model of a file.

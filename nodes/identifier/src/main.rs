@@ -4,6 +4,7 @@ mod diagnostics;
 mod memory;
 mod node;
 mod outputs;
+mod own_tires;
 mod run;
 mod watch;
 

@@ -22,6 +22,7 @@ use tokio::sync::watch;
 
 use crate::diagnostics::{Facts, LastRun, status};
 use crate::outputs::Outputs;
+use crate::own_tires::{Ended, publish_each};
 use crate::run::{Run, RunError};
 use crate::watch::{InForce, Watch, withdraw};
 
@@ -52,12 +53,14 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
         let in_force = RefCell::new(None);
         let (newest, sequence) = watch::channel(None);
         let (prior, prior_in_force) = watch::channel(None);
+        let (ended, runs) = watch::channel(None);
         tokio::select! {
             () = collect_sequences(sequences, newest) => {}
             () = collect_friction(frictions, prior, &facts) => {}
             () = report(&diagnostics, &facts) => {}
             () = follow_grip(odometry, drive, &vehicle, &in_force, &outputs) => {}
-            () = identify_each(sequence, prior_in_force, models, &outputs, &vehicle, &settings, &in_force, &facts) => {}
+            () = publish_each(runs, &vehicle, &outputs) => {}
+            () = identify_each(sequence, prior_in_force, models, ended, &outputs, &vehicle, &settings, &in_force, &facts) => {}
         }
         Ok(())
     })
@@ -201,6 +204,7 @@ async fn identify_each(
     mut sequences: watch::Receiver<Option<Arc<StateSequence>>>,
     prior: watch::Receiver<Option<FrictionPrior>>,
     mut models: Subscription<ModelMessage>,
+    ended: watch::Sender<Ended>,
     outputs: &Outputs,
     vehicle: &Arc<VehicleParameters>,
     settings: &Settings,
@@ -225,7 +229,7 @@ async fn identify_each(
             models: &mut models,
             on_step: &|text| facts.borrow_mut().running = Some(text.to_owned()),
         };
-        let result = run.finish().await;
+        let result = run.finish().await.map(Arc::new);
         if let Ok(outcome) = &result {
             let message = outputs.conclude(outcome, &sequence).await;
             log(outcome);
@@ -238,6 +242,10 @@ async fn identify_each(
                 .await;
             facts.borrow_mut().grip = notice;
             write_files(outcome, &sequence, settings);
+            // A window that still grows is for whoever needs a safe set soon.
+            if !sequence.grows() {
+                ended.send_replace(Some((Arc::clone(&sequence), Arc::clone(outcome))));
+            }
         }
         let mut facts = facts.borrow_mut();
         facts.runs += 1;
@@ -281,7 +289,7 @@ async fn hand_on(
     }
 }
 
-fn last_run(result: &Result<Outcome, RunError>) -> LastRun {
+fn last_run(result: &Result<Arc<Outcome>, RunError>) -> LastRun {
     match result {
         Ok(outcome) if outcome.accepted => LastRun::Accepted { remarks: outcome.reasons.join("; ") },
         Ok(outcome) => LastRun::Rejected { reason: outcome.reasons.join("; ") },

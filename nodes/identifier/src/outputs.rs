@@ -7,10 +7,12 @@ use gripsight_bag::encode;
 use gripsight_identification::{Candidate, Config, IterationRecord, Outcome, RunKey};
 use gripsight_identification_messages as messages;
 use gripsight_msgs::standard::std_msgs::Header;
-use gripsight_msgs::{Grip, IdentificationProgress as Progress, PacejkaParams};
+use gripsight_msgs::{
+    Grip, IdentificationProgress as Progress, PacejkaParams, TirePosterior as PosteriorMessage,
+};
 use gripsight_runtime::{Node, Parameter, Publisher, Qos};
 use gripsight_signals::StateSequence;
-use gripsight_vehicle::VehicleParameters;
+use gripsight_vehicle::{TirePosterior, VehicleParameters};
 
 use crate::memory;
 
@@ -18,6 +20,7 @@ use crate::memory;
 pub(crate) struct Outputs {
     candidate: Publisher<PacejkaParams>,
     pacejka: Publisher<PacejkaParams>,
+    posterior: Publisher<PosteriorMessage>,
     grip: Publisher<Grip>,
     progress: Publisher<Progress>,
     /// Where the set that the MPC was told last is kept; empty: nowhere.
@@ -29,6 +32,7 @@ impl Outputs {
         Ok(Self {
             candidate: node.publisher("~/candidate", Qos::latched())?,
             pacejka: node.publisher("~/pacejka", Qos::latched())?,
+            posterior: node.publisher("~/posterior", Qos::latched())?,
             grip: node.publisher("~/grip", Qos::latched())?,
             progress: node.publisher("~/progress", Qos::latched())?,
             folder,
@@ -62,6 +66,12 @@ impl Outputs {
         {
             tracing::error!("the set is not kept for the next start: {error}");
         }
+    }
+
+    /// Publishes the car's own tires beside the end of a run.
+    pub(crate) async fn own_tires(&self, tires: &TirePosterior, key: &RunKey, sequence: &StateSequence) {
+        let message = PosteriorMessage { header: header(sequence), ..messages::tire_posterior(tires, key) };
+        self.posterior.publish(&message).await;
     }
 
     /// Publishes what the last start of this car knew, where there was one: as provisional, on the MPC's topic only where it takes such sets.

@@ -1,4 +1,4 @@
-//! The diagnosis on topics: a replayed drive with a known effect in, reports over a moving window out, within bounds.
+//! The diagnosis on topics, behind the identification: a replayed drive with a known effect in, reports over a moving window out, within bounds.
 
 use std::time::Duration;
 
@@ -25,7 +25,7 @@ fn a_moving_window_of_a_replayed_drive_is_diagnosed_within_bounds() {
     };
     let folder = tempfile::tempdir().unwrap();
     let effect = format!("{EFFECT}={DELAY_S}");
-    let (bag, vehicle) = simulate(folder.path(), &["--effect", &effect, "--duration", "34", "--seed", "12"]);
+    let (bag, vehicle) = simulate(folder.path(), &["--effect", &effect, "--duration", "48", "--seed", "12"]);
     let domain = Domain::new();
     let vehicle = ["--params-file", vehicle.to_str().unwrap()];
     let timeout = RUN.as_secs().to_string();
@@ -35,9 +35,14 @@ fn a_moving_window_of_a_replayed_drive_is_diagnosed_within_bounds() {
         &python,
         &[&["subscribe", "/gap_diagnosis/report", GapReport::TYPE], &listen[..]].concat(),
     );
-    let diagnosis =
-        node(&domain, "gap_diagnosis", &[&["-r", "sequence:=telemetry/sequence"], &vehicle[..]].concat());
-    let window = ["-p", "window_s:=20.0", "-p", "hop_s:=12.0", "-p", "reliable_inputs:=true"];
+    let joined = ["-r", "sequence:=telemetry/sequence", "-r", "posterior:=identifier/posterior"];
+    let diagnosis = node(&domain, "gap_diagnosis", &[&joined[..], &vehicle[..]].concat());
+    let joined = ["-r", "sequence:=telemetry/sequence", "-r", "model:=s4_residual/model"];
+    let _identifier = node(&domain, "identifier", &[&joined[..], &vehicle[..]].concat());
+    let joined = ["-r", "sequence:=telemetry/sequence", "-r", "candidate:=identifier/candidate"];
+    let _residual = node(&domain, "s4_residual", &[&joined[..], &vehicle[..]].concat());
+    // The second window begins after the first: what the identifier learned of the car's own tires there is a prior for it.
+    let window = ["-p", "window_s:=20.0", "-p", "hop_s:=23.0", "-p", "reliable_inputs:=true"];
     let topics = ["-r", "odom:=/car_state/odom", "-r", "imu:=/imu/data", "-r", "wheels:=/wheel_speeds"];
     let _telemetry = node(&domain, "telemetry", &[&window[..], &topics[..], &vehicle[..]].concat());
     let path = format!("bag:={}", bag.display());
@@ -52,6 +57,9 @@ fn a_moving_window_of_a_replayed_drive_is_diagnosed_within_bounds() {
     let (first, second) = (report(), report());
     let id = |report: &Value| report["handshake"]["sequence_id"].as_u64().unwrap();
     assert!(id(&first) < id(&second));
+    // A loss of grip shows only against tires that are known.
+    let hides_grip = |report: &Value| report["invisible"].as_array().unwrap().contains(&"grip_scale".into());
+    assert!(hides_grip(&first) && !hides_grip(&second), "{} {}", first["invisible"], second["invisible"]);
     for report in [&first, &second] {
         let named = &report["effects"][0];
         assert_eq!((&named["name"], &named["accepted"]), (&EFFECT.into(), &true.into()), "{report}");

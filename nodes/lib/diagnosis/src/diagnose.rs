@@ -3,7 +3,7 @@
 use gripsight_estimation::{Windows, split};
 use gripsight_model::{EffectId, Flexible, HOLD, Need, Recording, Site};
 use gripsight_signals::{DataHealth, StateSequence};
-use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
+use gripsight_vehicle::{PacejkaParameters, TirePosterior, VehicleParameters};
 
 use crate::budget::{Budget, CANDIDATES, Models, Scorer, large_slip_rad};
 use crate::engine::Engine;
@@ -11,11 +11,12 @@ use crate::figures::figures;
 use crate::finding::{detection_limits, ranked, sites};
 use crate::infer::{Inferred, infer, linearised};
 use crate::outcome::{Diagnosis, Inference, Invisible, TirePair, Verdict};
+use crate::posterior::{is_of, trust, usual};
 use crate::state::State;
 use crate::trust::TireTrust;
 use crate::usable::{Usable, cannot_tell, refused, usable};
 use crate::verdict::{decide, drive_next, errors, record_next};
-use crate::{Earlier, ExtendedModelFile, GapError, TirePosterior, noise, pictures, place, plausible};
+use crate::{Earlier, ExtendedModelFile, GapError, noise, pictures, place, plausible};
 
 /// What is diagnosed, and with what.
 #[derive(Debug, Clone)]
@@ -109,8 +110,8 @@ pub(crate) fn explain(
     }
     progress("fitting the tires");
     let (tires, trust) = match (request.posterior, request.given_tires()) {
-        (Some(posterior), _) if posterior.is_of(request.sequence) => (posterior.tires()?, TireTrust::free()),
-        (Some(posterior), _) => (posterior.tires()?, posterior.trust()?),
+        (Some(posterior), _) if is_of(posterior, request.sequence) => (posterior.tires()?, TireTrust::free()),
+        (Some(posterior), _) => (posterior.tires()?, trust(posterior)?),
         (None, Some(tires)) if request.earlier.is_some() => (tires, TireTrust::drive()),
         (None, Some(tires)) => (tires, TireTrust::file()),
         (None, None) => (fit_tires(&recording, request.vehicle, &windows.training)?, TireTrust::free()),
@@ -120,7 +121,7 @@ pub(crate) fn explain(
     if let Some(model) = request.given_model() {
         (engine.held, engine.usual) = model.parameters()?;
     } else if let Some(posterior) = request.posterior {
-        engine.usual = posterior.usual()?;
+        engine.usual = usual(posterior)?;
     }
     let nominal = engine.nominal_model();
     // The inference works on a bounded number of windows, the final fit on all.

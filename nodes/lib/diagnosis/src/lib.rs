@@ -65,5 +65,5 @@ pub use outcome::{
     DetectionLimit, Diagnosis, EffectParameter, GapBudget, GapStep, Inference, Invisible, Place, Prediction,
     RankedEffect, Series, TirePair, Verdict, Where,
 };
-pub use posterior::{PosteriorParameter, TirePosterior, own_tires};
+pub use posterior::own_tires;
 pub use trust::TireTrust;

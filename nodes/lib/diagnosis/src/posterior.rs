@@ -1,11 +1,10 @@
-//! The car's own tires as a drive knows them, with what goes along with them: posterior.json.
+//! The car's own tires: their fit to a drive, and what they say of another one.
 
 use gripsight_estimation::selection::Term;
 use gripsight_estimation::split;
 use gripsight_model::{BASE, EffectId, Flexible, Site, TIRES};
 use gripsight_signals::{DataHealth, StateSequence};
-use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
-use serde::{Deserialize, Serialize};
+use gripsight_vehicle::{PacejkaParameters, PosteriorParameter, TirePosterior, VehicleParameters};
 
 use crate::around::Around;
 use crate::budget::large_slip_rad;
@@ -22,35 +21,6 @@ use crate::{GapError, Request};
 /// Names of a tire's parameters, in the order of the fit.
 const TIRE: [&str; 4] = ["b", "c", "d", "e"];
 const AXLES: [&str; 2] = ["front", "rear"];
-
-/// A parameter of a [`TirePosterior`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PosteriorParameter {
-    /// `front.b` … `rear.e` of the Magic Formula; `effect.parameter` of what every car has a little of.
-    pub name: String,
-    /// Unit; `1` for none, `1/rad` of B.
-    pub unit: String,
-    /// Mean.
-    pub mean: f64,
-}
-
-/// The tires of the car with its load transfer, combined slip and relaxation (not those of a bare single-track model, which take these on themselves),
-/// fitted together with these, and how well a drive knows them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TirePosterior {
-    /// Status of the identification that it was made beside: it says nothing of these tires' worth as a prior, their covariance does.
-    pub status: String,
-    /// Hash of the vehicle file, as in the identification's result.
-    pub vehicle_hash: String,
-    /// The parameters.
-    pub parameters: Vec<PosteriorParameter>,
-    /// Their covariance.
-    pub covariance: Vec<Vec<f64>>,
-    /// Hashes of the seconds of driving that it was fitted on: on these it is a place to start from, never a prior.
-    pub data: Vec<String>,
-}
 
 /// Fits the car's own tires to a drive. `start`: tires that are known to be near, or none: then from several. `status` and `vehicle_hash` of the
 /// identification that they go along with.
@@ -103,13 +73,8 @@ pub fn own_tires(
     // Tires and what every car has; how long a command is held is nobody's to inherit.
     let used: Vec<usize> = (0..TIRES).chain(BASE..columns.first_flexible()).collect();
     let covariance = own_covariance(&around, &weighed, &used).ok_or(GapError::NotFinite)?;
-    let named = |i: usize, axle: &str| PosteriorParameter {
-        name: format!("{axle}.{}", TIRE[i]),
-        unit: if i == 0 { "1/rad" } else { "1" }.to_owned(),
-        mean: 0.0,
-    };
-    let mut parameters: Vec<PosteriorParameter> =
-        AXLES.iter().flat_map(|axle| (0..TIRE.len()).map(|i| named(i, axle))).collect();
+    let tires = std::array::from_fn(|i| values[i]);
+    let mut parameters = PosteriorParameter::of_tires(&PacejkaParameters::from_array(tires));
     for &effect in &columns.effects {
         parameters.extend(effect.spec().parameters.iter().map(|p| PosteriorParameter {
             name: format!("{}.{}", effect.name(), p.name),
@@ -127,86 +92,41 @@ pub fn own_tires(
     })
 }
 
-impl TirePosterior {
-    /// From posterior.json.
-    ///
-    /// # Errors
-    /// [`GapError::ModelFile`] says what cannot be read or used.
-    pub fn from_json(text: &str) -> Result<Self, GapError> {
-        let posterior: Self = serde_json::from_str(text).map_err(|e| GapError::ModelFile(e.to_string()))?;
-        posterior.checked()?;
-        Ok(posterior)
-    }
+/// What every car has, at the mean.
+pub(crate) fn usual(posterior: &TirePosterior) -> Result<Sized, GapError> {
+    let own = |effect: EffectId| {
+        let parameters = effect.spec().parameters.iter();
+        let values = parameters.map(|p| posterior.mean(&format!("{}.{}", effect.name(), p.name)));
+        Ok((effect, values.collect::<Result<Vec<f64>, _>>()?))
+    };
+    EffectId::background().map(own).collect()
+}
 
-    fn checked(&self) -> Result<(), GapError> {
-        let wrong = |what: &str| Err(GapError::ModelFile(what.to_owned()));
-        let n = self.parameters.len();
-        let square = self.covariance.len() == n && self.covariance.iter().all(|row| row.len() == n);
-        if !square {
-            return wrong("the covariance does not have a row and a column for each parameter");
+/// How far the tires are trusted on another drive: as well as this one knows them, and no better than tires stay the same.
+pub(crate) fn trust(posterior: &TirePosterior) -> Result<TireTrust, GapError> {
+    let [least, most] = [TireTrust::drive(), TireTrust::free()];
+    let mut trust = least;
+    for axle in AXLES {
+        let mut at = [0; 4];
+        for (place, p) in at.iter_mut().zip(TIRE) {
+            *place = posterior.place(&format!("{axle}.{p}"))?;
         }
-        let finite = self.parameters.iter().map(|p| p.mean).chain(self.covariance.iter().flatten().copied());
-        if !finite.into_iter().all(f64::is_finite) || (0..n).any(|i| self.covariance[i][i] < 0.0) {
-            return wrong("a mean or a covariance is not a finite number");
-        }
-        self.tires()?;
-        self.usual().map(|_| ())
+        let mean = |i: usize| posterior.parameters[at[i]].mean;
+        let cov = |i: usize, j: usize| posterior.covariance[at[i]][at[j]];
+        // The stiffness is B C D.
+        let relative = |i: usize, j: usize| cov(i, j) / (mean(i) * mean(j));
+        let stiffness: f64 = (0..3).flat_map(|i| (0..3).map(move |j| relative(i, j))).sum();
+        trust.stiffness = trust.stiffness.max(stiffness.max(0.0).sqrt()).min(most.stiffness);
+        trust.peak = trust.peak.max(relative(2, 2).max(0.0).sqrt()).min(most.peak);
+        trust.shape = trust.shape.max(cov(1, 1).sqrt()).min(most.shape);
+        trust.curvature = trust.curvature.max(cov(3, 3).sqrt()).min(most.curvature);
     }
+    Ok(trust)
+}
 
-    fn place(&self, name: &str) -> Result<usize, GapError> {
-        let found = self.parameters.iter().position(|p| p.name == name);
-        found.ok_or_else(|| GapError::ModelFile(format!("the parameter `{name}` is missing")))
-    }
-
-    /// The tires at the mean.
-    pub(crate) fn tires(&self) -> Result<PacejkaParameters, GapError> {
-        let mut own = [0.0; TIRES];
-        let names = AXLES.iter().flat_map(|axle| TIRE.iter().map(move |p| format!("{axle}.{p}")));
-        for (value, name) in own.iter_mut().zip(names) {
-            *value = self.parameters[self.place(&name)?].mean;
-        }
-        Ok(PacejkaParameters::from_array(own))
-    }
-
-    /// What every car has, at its mean.
-    pub(crate) fn usual(&self) -> Result<Sized, GapError> {
-        let own = |effect: EffectId| {
-            let parameters = effect.spec().parameters.iter();
-            let values = parameters.map(|p| {
-                let place = self.place(&format!("{}.{}", effect.name(), p.name))?;
-                Ok(self.parameters[place].mean)
-            });
-            Ok((effect, values.collect::<Result<Vec<f64>, GapError>>()?))
-        };
-        EffectId::background().map(own).collect()
-    }
-
-    /// How far the tires are trusted on another drive: as well as this one knows them, and no better than tires stay the same.
-    pub(crate) fn trust(&self) -> Result<TireTrust, GapError> {
-        let [least, most] = [TireTrust::drive(), TireTrust::free()];
-        let mut trust = least;
-        for axle in AXLES {
-            let mut at = [0; 4];
-            for (place, p) in at.iter_mut().zip(TIRE) {
-                *place = self.place(&format!("{axle}.{p}"))?;
-            }
-            let mean = |i: usize| self.parameters[at[i]].mean;
-            let cov = |i: usize, j: usize| self.covariance[at[i]][at[j]];
-            // The stiffness is B C D.
-            let relative = |i: usize, j: usize| cov(i, j) / (mean(i) * mean(j));
-            let stiffness: f64 = (0..3).flat_map(|i| (0..3).map(move |j| relative(i, j))).sum();
-            trust.stiffness = trust.stiffness.max(stiffness.max(0.0).sqrt()).min(most.stiffness);
-            trust.peak = trust.peak.max(relative(2, 2).max(0.0).sqrt()).min(most.peak);
-            trust.shape = trust.shape.max(cov(1, 1).sqrt()).min(most.shape);
-            trust.curvature = trust.curvature.max(cov(3, 3).sqrt()).min(most.curvature);
-        }
-        Ok(trust)
-    }
-
-    /// Whether any second of a drive is one that it was fitted on.
-    pub(crate) fn is_of(&self, sequence: &StateSequence) -> bool {
-        seconds(sequence).iter().any(|second| self.data.contains(second))
-    }
+/// Whether any second of a drive is one that the tires were fitted on.
+pub(crate) fn is_of(posterior: &TirePosterior, sequence: &StateSequence) -> bool {
+    seconds(sequence).iter().any(|second| posterior.data.contains(second))
 }
 
 /// A hash of every whole second, by its own stamps: a part cut from a drive is known again.
@@ -258,31 +178,16 @@ mod tests {
     #[test]
     fn trust_follows_the_covariance_between_what_stays_and_what_is_known_without() {
         let mut of = posterior();
-        let trust = of.trust().unwrap();
-        approx::assert_relative_eq!(trust.peak, 0.05, epsilon = 1e-12);
-        approx::assert_relative_eq!(trust.stiffness, 0.05 * 3.0_f64.sqrt(), epsilon = 1e-12);
+        let known = trust(&of).unwrap();
+        approx::assert_relative_eq!(known.peak, 0.05, epsilon = 1e-12);
+        approx::assert_relative_eq!(known.stiffness, 0.05 * 3.0_f64.sqrt(), epsilon = 1e-12);
         // A stiffness that is known although B and D are not: they go against each other.
         for (b, d) in [(0, 2), (4, 6)] {
             (of.covariance[b][d], of.covariance[d][b]) = (-0.01, -0.01);
         }
-        assert!(of.trust().unwrap().stiffness < trust.stiffness);
+        assert!(trust(&of).unwrap().stiffness < known.stiffness);
         of.covariance.iter_mut().flatten().for_each(|c| *c = 0.0);
-        assert_eq!(of.trust().unwrap(), TireTrust::drive());
-    }
-
-    #[test]
-    fn what_is_wrong_with_a_file_is_named() {
-        let good = posterior();
-        let text = serde_json::to_string(&good).unwrap();
-        assert_eq!(TirePosterior::from_json(&text).unwrap(), good);
-        let broken = |change: &dyn Fn(&mut TirePosterior)| {
-            let mut bad = good.clone();
-            change(&mut bad);
-            TirePosterior::from_json(&serde_json::to_string(&bad).unwrap()).unwrap_err().to_string()
-        };
-        assert!(broken(&|p| p.parameters[3].name = "front.x".to_owned()).contains("`front.e` is missing"));
-        assert!(broken(&|p| drop(p.covariance.pop())).contains("row and a column"));
-        assert!(broken(&|p| p.covariance[2][2] = -1.0).contains("not a finite number"));
+        assert_eq!(trust(&of).unwrap(), TireTrust::drive());
     }
 
     #[test]
@@ -304,7 +209,7 @@ mod tests {
         let mut part = drive(0.0);
         let kept: Vec<bool> = part.time_s.iter().map(|t| (3.5..7.2).contains(t)).collect();
         part.retain(|i| kept[i]);
-        assert!(of.is_of(&part));
-        assert!(!of.is_of(&drive(0.5)));
+        assert!(is_of(&of, &part));
+        assert!(!is_of(&of, &drive(0.5)));
     }
 }

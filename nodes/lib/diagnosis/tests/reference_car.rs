@@ -5,12 +5,11 @@
 mod common;
 
 use common::{drive, drive_at, nominal, text};
-use gripsight_diagnosis::{
-    Diagnosis, Earlier, GapError, Request, TirePosterior, Verdict, diagnose, own_tires,
-};
+use gripsight_diagnosis::{Diagnosis, Earlier, GapError, Request, Verdict, diagnose, own_tires};
 use gripsight_model::ModelError;
 use gripsight_reference_car::CarParameters;
 use gripsight_signals::StateSequence;
+use gripsight_vehicle::TirePosterior;
 
 const DURATION_S: f64 = 30.0;
 
@@ -169,7 +168,7 @@ fn a_car_s_own_tires_cost_no_name_on_their_own_drive_and_show_grip_on_another() 
     };
     let posterior = own_tires(&recording, &vehicle, None, ("accepted", "0")).unwrap();
     let json = serde_json::to_string(&posterior).unwrap();
-    let posterior = TirePosterior::from_json(&json).unwrap();
+    let posterior = serde_json::from_str::<TirePosterior>(&json).unwrap().checked().unwrap();
     assert_eq!(named(&of(&recording, &posterior)), named(&diagnosed(&recording, &[])));
     // On the drive that they were fitted on they say nothing of grip; on another they do.
     let invisible = |d: &Diagnosis| d.invisible.iter().any(|i| i.name == "grip_scale");

@@ -5,7 +5,9 @@ use gripsight_identification::{
     PeakFriction, Range, ResidualKind, ResidualModel, RunKey, SignalCorrections, Status,
 };
 use gripsight_msgs as msg;
-use gripsight_vehicle::{MagicFormula, PacejkaParameters, VehicleParameters};
+use gripsight_vehicle::{
+    MagicFormula, PacejkaParameters, PosteriorParameter, TirePosterior, VehicleError, VehicleParameters,
+};
 
 /// The key of a run as a message.
 #[must_use]
@@ -135,6 +137,48 @@ pub fn result(outcome: &Outcome) -> msg::PacejkaParams {
         signals: signals(&outcome.signals),
         v_x_mean_mps: outcome.mean_speed_mps,
     }
+}
+
+/// The car's own tires beside a run.
+#[must_use]
+pub fn tire_posterior(posterior: &TirePosterior, key: &RunKey) -> msg::TirePosterior {
+    let parameters = &posterior.parameters;
+    msg::TirePosterior {
+        header: msg::standard::std_msgs::Header::default(),
+        handshake: handshake(key),
+        status: posterior.status.clone(),
+        names: parameters.iter().map(|p| p.name.clone()).collect(),
+        units: parameters.iter().map(|p| p.unit.clone()).collect(),
+        mean: parameters.iter().map(|p| p.mean).collect(),
+        covariance: posterior.covariance.concat(),
+        data: posterior.data.clone(),
+    }
+}
+
+/// The inverse of [`tire_posterior`].
+///
+/// # Errors
+/// [`VehicleError::Posterior`] says what of the message is not whole.
+pub fn own_tires(message: &msg::TirePosterior) -> Result<TirePosterior, VehicleError> {
+    let n = message.names.len();
+    if message.units.len() != n || message.mean.len() != n || message.covariance.len() != n * n {
+        return Err(VehicleError::Posterior(
+            "names, units, mean and covariance do not fit together".to_owned(),
+        ));
+    }
+    let parameter = |i: usize| PosteriorParameter {
+        name: message.names[i].clone(),
+        unit: message.units[i].clone(),
+        mean: message.mean[i],
+    };
+    let posterior = TirePosterior {
+        status: message.status.clone(),
+        vehicle_hash: message.handshake.vehicle_hash.clone(),
+        parameters: (0..n).map(parameter).collect(),
+        covariance: (0..n).map(|i| message.covariance[i * n..(i + 1) * n].to_vec()).collect(),
+        data: message.data.clone(),
+    };
+    posterior.checked()
 }
 
 /// A residual model as a message; `training_time_s` is what the sender's clock took.
@@ -309,6 +353,30 @@ mod tests {
         assert_eq!(candidate(&message), Some(sent));
         let other = msg::PacejkaParams { status: msg::PacejkaParams::ACCEPTED, ..message };
         assert_eq!(candidate(&other), None);
+    }
+
+    #[test]
+    fn the_car_s_own_tires_survive_their_message_and_half_of_them_are_refused() {
+        let parameters = PosteriorParameter::of_tires(&tires());
+        let n = parameters.len();
+        let row = |i: usize| (0..n).map(|j| 1.0 / (3.0 + i as f64 + 2.0 * j as f64)).collect();
+        let sent = TirePosterior {
+            status: "accepted_within".into(),
+            vehicle_hash: key().vehicle_hash,
+            covariance: (0..n).map(row).collect(),
+            parameters,
+            data: vec!["00ff".into()],
+        };
+        let message = tire_posterior(&sent, &key());
+        assert_eq!(own_tires(&message).unwrap(), sent);
+        let broken = |change: &dyn Fn(&mut msg::TirePosterior)| {
+            let mut bad = message.clone();
+            change(&mut bad);
+            own_tires(&bad).unwrap_err().to_string()
+        };
+        assert!(broken(&|m| m.covariance.truncate(3)).contains("do not fit together"));
+        assert!(broken(&|m| m.mean[2] = f64::NAN).contains("not a finite number"));
+        assert!(broken(&|m| m.names[7].push('x')).contains("`rear.e` is missing"));
     }
 
     #[test]

@@ -23,4 +23,7 @@ pub enum VehicleError {
         /// The nodes that are there.
         found: String,
     },
+    /// A file or a message of the car's own tires is not whole.
+    #[error("tire posterior: {0}")]
+    Posterior(String),
 }

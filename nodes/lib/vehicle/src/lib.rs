@@ -3,6 +3,7 @@
 //! * [`MagicFormula`]: normalised lateral force of one axle's tires, F_y/F_z;
 //! * [`SingleTrack`]: the dynamic single-track model of the paper (arXiv 2603.09399, eq. 1-5);
 //! * [`VehicleParameters`]: what is known of the car, read from a ROS 2 parameter file;
+//! * [`TirePosterior`]: the tires of the car with its load transfer and combined slip, as a drive knows them;
 //! * [`handling`]: numbers that an engineer knows: cornering stiffness, understeer gradient, stability.
 //!
 //! The equations are written once, for any [`Real`]: with `f64` they are simulated, with dual numbers they give exact derivatives.
@@ -15,12 +16,14 @@ mod magic_formula;
 mod parameters;
 mod real;
 mod single_track;
+mod tire_posterior;
 
 pub use error::VehicleError;
 pub use magic_formula::{MagicFormula, PacejkaParameters};
 pub use parameters::VehicleParameters;
 pub use real::{Dual, Real};
 pub use single_track::{Input, SingleTrack, State};
+pub use tire_posterior::{PosteriorParameter, TirePosterior};
 
 /// Standard gravity.
 pub const GRAVITY_MPS2: f64 = 9.806_65;
