@@ -74,7 +74,8 @@ pub fn linearize<M: Rollout>(
                 21..=24 => part::<M, 24>(problem, &free, parameters, *start, window),
                 25..=32 => part::<M, 32>(problem, &free, parameters, *start, window),
                 33..=48 => part::<M, 48>(problem, &free, parameters, *start, window),
-                _ => part::<M, 80>(problem, &free, parameters, *start, window),
+                49..=80 => part::<M, 80>(problem, &free, parameters, *start, window),
+                _ => in_passes::<M, 80>(problem, &free, parameters, *start, window),
             }
         })
         .collect();
@@ -216,7 +217,59 @@ fn part<M: Rollout, const N: usize>(
     let (cost, weight) = loss(square, n, problem.robust_k);
     let jtj = DMatrix::from_fn(p + 2, p + 2, |a, b| weight * lower[a.max(b)][a.min(b)]);
     let jtr = DVector::from_fn(p + 2, |a, _| weight * product[a]);
+    eliminated(cost, n, &jtj, &jtr)
+}
 
+/// The same for more parameters than one rollout has derivatives of: a rollout for each N - 2 of them.
+fn in_passes<M: Rollout, const N: usize>(
+    problem: &Problem<'_, M>,
+    free: &[usize],
+    parameters: &[f64],
+    start: [f64; 2],
+    window: &Window,
+) -> WindowPart {
+    let (p, lanes) = (free.len(), N - 2);
+    let start = [Dual::<N>::variable(start[0], lanes), Dual::variable(start[1], lanes + 1)];
+    let (mut predicted, mut measured) = (Vec::new(), Vec::new());
+    problem.model.measured(window, &mut measured);
+    let channels = problem.sigma.len();
+    let mut rows: Vec<f64> = Vec::new();
+    let mut jacobian = DMatrix::zeros(0, p + 2);
+    for (pass, chunk) in free.chunks(lanes).enumerate() {
+        let mut theta: Vec<Dual<N>> = parameters.iter().map(|&v| Dual::from(v)).collect();
+        for (lane, &j) in chunk.iter().enumerate() {
+            theta[j] = Dual::variable(parameters[j], lane);
+        }
+        problem.model.rollout(&theta, start, window, &mut predicted);
+        let kept: Vec<(usize, f64)> = residuals(problem, &measured, &predicted).collect();
+        if pass == 0 {
+            rows = kept.iter().map(|(_, r)| *r).collect();
+            jacobian = DMatrix::zeros(kept.len(), p + 2);
+        }
+        for (row, (i, _)) in kept.iter().enumerate() {
+            let scale = -1.0 / problem.sigma[i % channels];
+            let derivatives = predicted[*i].derivatives();
+            for lane in 0..chunk.len() {
+                jacobian[(row, pass * lanes + lane)] = scale * derivatives[lane];
+            }
+            for s in 0..2 {
+                jacobian[(row, p + s)] = scale * derivatives[lanes + s];
+            }
+        }
+    }
+    let residual = DVector::from_vec(rows);
+    let (cost, weight) = loss(residual.norm_squared(), residual.len(), problem.robust_k);
+    eliminated(
+        cost,
+        residual.len(),
+        &(jacobian.tr_mul(&jacobian) * weight),
+        &(jacobian.tr_mul(&residual) * weight),
+    )
+}
+
+/// A window of `n` residuals with its start state, the last two of J^T J and J^T r, taken out.
+fn eliminated(cost: f64, n: usize, jtj: &DMatrix<f64>, jtr: &DVector<f64>) -> WindowPart {
+    let p = jtr.len() - 2;
     let start_block = Matrix2::new(jtj[(p, p)], jtj[(p, p + 1)], jtj[(p + 1, p)], jtj[(p + 1, p + 1)]);
     // A start that the outputs do not show stays where it is.
     let inverse = (start_block + Matrix2::identity() * 1e-12).try_inverse().unwrap_or_else(Matrix2::zeros);
@@ -227,4 +280,19 @@ fn part<M: Rollout, const N: usize>(
     let information = jtj.view((0, 0), (p, p)) - cross.transpose() * &slope;
     let gradient = jtr.rows(0, p) - cross.transpose() * offset;
     WindowPart { cost, residuals: n, information, gradient, elimination: Elimination { offset, slope } }
+}
+
+#[cfg(test)]
+pub(super) fn by_lanes_and_in_passes<M: Rollout>(
+    problem: &Problem<'_, M>,
+    parameters: &[f64],
+    start: [f64; 2],
+) -> [(f64, DMatrix<f64>, DVector<f64>); 2] {
+    let free = problem.free();
+    let window = &problem.windows[0];
+    let told = |part: WindowPart| (part.cost, part.information, part.gradient);
+    [
+        told(part::<M, 4>(problem, &free, parameters, start, window)),
+        told(in_passes::<M, 3>(problem, &free, parameters, start, window)),
+    ]
 }

@@ -141,3 +141,25 @@ fn the_gradient_is_the_derivative_of_the_cost() {
     let numeric = (at(20.001) - at(19.999)) / 0.002;
     approx::assert_relative_eq!(2.0 * here.gradient[0], numeric, max_relative = 1e-4);
 }
+
+#[test]
+fn more_parameters_than_a_rollout_has_derivatives_of_are_taken_in_passes() {
+    let plant = plant(0.01, 4);
+    let windows = tile(&[1000], 50);
+    let parameters = parameters();
+    let problem = Problem {
+        model: &plant,
+        windows: &windows,
+        sigma: &[0.01],
+        parameters: &parameters,
+        robust_k: 2.0,
+        tolerance: TOLERANCE,
+        max_iterations: 0,
+    };
+    let [(cost, information, gradient), passes] =
+        super::linearize::by_lanes_and_in_passes(&problem, &[20.0, 1.0], [0.1, -0.2]);
+    assert_eq!(problem.free().len(), 2);
+    approx::assert_relative_eq!(cost, passes.0, max_relative = 1e-12);
+    approx::assert_relative_eq!(information, passes.1, max_relative = 1e-9);
+    approx::assert_relative_eq!(gradient, passes.2, max_relative = 1e-9);
+}
