@@ -1,6 +1,8 @@
 //! The `vehicle` block that the nodes share: the same parameter file as the offline command's `--vehicle`.
 
-use gripsight_vehicle::{VehicleError, VehicleParameters};
+use std::collections::BTreeMap;
+
+use gripsight_vehicle::{FIGURES, VehicleError, VehicleParameters};
 
 use crate::{Descriptor, Error, Node};
 
@@ -15,6 +17,13 @@ pub fn vehicle_parameters(node: &mut Node) -> Result<VehicleParameters, Error> {
     };
     const NOT_STATED: f64 = -1.0;
     let known = VehicleParameters::f1tenth();
+    let mut sigma = BTreeMap::new();
+    for figure in FIGURES {
+        let meaning =
+            format!("How well {figure} is known, one standard deviation; 0: as teams mostly know it");
+        sigma.insert(figure.to_owned(), number(&format!("sigma.{figure}"), 0.0, &meaning)?);
+    }
+    sigma.retain(|_, sigma| *sigma != 0.0);
     let vehicle = VehicleParameters {
         mass_kg: number("mass_kg", 0.0, "Mass [kg]; required")?,
         yaw_inertia_kgm2: number("yaw_inertia_kgm2", 0.0, "Yaw inertia [kg m2]; required")?,
@@ -41,6 +50,7 @@ pub fn vehicle_parameters(node: &mut Node) -> Result<VehicleParameters, Error> {
         wheel_radius_m: Some(number("wheel_radius_m", 0.0, "Radius of the driven wheels [m]; 0: not known")?)
             .filter(|&r| r != 0.0),
         name: None,
+        sigma,
     };
     let name = node.parameter(
         "vehicle.name",

@@ -20,7 +20,7 @@ mod tire_posterior;
 
 pub use error::VehicleError;
 pub use magic_formula::{MagicFormula, PacejkaParameters};
-pub use parameters::VehicleParameters;
+pub use parameters::{FIGURES, VehicleParameters};
 pub use real::{Dual, Real};
 pub use single_track::{Input, SingleTrack, State};
 pub use tire_posterior::{PosteriorParameter, TirePosterior};

@@ -10,6 +10,8 @@
 //!       l_f_m: 0.15      # centre of gravity to front axle
 //!       l_r_m: 0.17      # centre of gravity to rear axle
 //!       h_cg_m: 0.06
+//!       sigma:           # optional: how well a figure is known, one standard deviation in its unit
+//!         mass_kg: 0.02
 //! ```
 
 use std::collections::BTreeMap;
@@ -47,7 +49,24 @@ pub struct VehicleParameters {
     /// Radius of the driven wheels, where known: turns wheel effort into force.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wheel_radius_m: Option<f64>,
+    /// How well figures are known, where stated: one standard deviation of some of [`FIGURES`], in the figure's unit. The others are known as teams
+    /// mostly know them.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub sigma: BTreeMap<String, f64>,
 }
+
+/// Figures whose uncertainty may be stated: those of the car, and the scales of signals.
+pub const FIGURES: [&str; 9] = [
+    "mass_kg",
+    "yaw_inertia_kgm2",
+    "l_f_m",
+    "h_cg_m",
+    "drive_front_share",
+    "brake_front_share",
+    "steering_scale",
+    "v_x_scale",
+    "yaw_rate_scale",
+];
 
 /// Wheelbase up to which a car is a model car.
 const MODEL_CAR_M: f64 = 1.0;
@@ -112,6 +131,16 @@ impl VehicleParameters {
         if let Some(&(name, got)) = shares.iter().find(|(_, v)| !(0.0..=1.0).contains(v)) {
             return Err(VehicleError::Parameter { name, got, must: "between 0 and 1" });
         }
+        for (name, &got) in &self.sigma {
+            let Some(&name) = FIGURES.iter().find(|figure| *figure == name) else {
+                let known = FIGURES.join(", ");
+                return Err(VehicleError::Yaml(format!("vehicle.sigma has `{name}`; it may have {known}")));
+            };
+            if !(got.is_finite() && got > 0.0) {
+                let must = "positive and finite (vehicle.sigma)";
+                return Err(VehicleError::Parameter { name, got, must });
+            }
+        }
         Ok(self)
     }
 
@@ -171,6 +200,7 @@ impl VehicleParameters {
             brake_front_share: None,
             max_steering_rad: default_max_steering_rad(),
             wheel_radius_m: None,
+            sigma: BTreeMap::new(),
         }
     }
 }
@@ -199,6 +229,15 @@ mod tests {
         assert!(error(&GOOD.replace("mass_kg", "mass_lb")).contains("mass_lb"));
         assert!(error("/car:\n  ros__parameters:\n    mass: 1\n").contains("/car"));
         assert!(error("][").starts_with("vehicle file"));
+    }
+
+    #[test]
+    fn how_well_a_figure_is_known_may_be_stated() {
+        let stated = |text: &str| VehicleParameters::from_ros_yaml(&format!("{GOOD}      sigma: {text}\n"));
+        assert_eq!(stated("{mass_kg: 0.02}").unwrap().sigma["mass_kg"], 0.02);
+        let error = |text: &str| stated(text).unwrap_err().to_string();
+        assert!(error("{mass_lb: 1.0}").contains("`mass_lb`; it may have mass_kg, "));
+        assert!(error("{v_x_scale: 0.0}").contains("v_x_scale is 0, must be positive"));
     }
 
     #[test]

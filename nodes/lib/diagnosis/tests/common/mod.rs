@@ -103,5 +103,6 @@ pub(crate) fn nominal(car: &CarParameters) -> VehicleParameters {
         brake_front_share: Some(car.drive.brake_front_share),
         max_steering_rad: car.max_steering_rad,
         wheel_radius_m: Some(car.drive.wheel_radius_m),
+        sigma: std::collections::BTreeMap::new(),
     }
 }

@@ -259,10 +259,16 @@ impl EffectId {
     }
 
     /// How much of its first parameter a car may well have without anything being the matter, in its unit; `size` is one that matters on this
-    /// car. Nothing of an effect that a sound car has nothing of.
+    /// car. Where the vehicle file states how well the figure is known whose error it is, that; nothing of an effect that a sound car has nothing of.
     #[must_use]
     pub fn usual(self, vehicle: &VehicleParameters, size: f64) -> Option<f64> {
-        self.spec().usual.map(|usual| usual(vehicle, size))
+        let stated = self.spec().figure.and_then(|figure| {
+            let sigma = vehicle.sigma.get(figure.name)?;
+            let null = self.spec().parameters.first()?.null;
+            let by_unit = (figure.value)(vehicle, null + 1.0) - (figure.value)(vehicle, null);
+            Some(sigma / by_unit.abs())
+        });
+        stated.or_else(|| self.spec().usual.map(|usual| usual(vehicle, size)))
     }
 
     /// Whether it sits in one part of the lap.
@@ -293,6 +299,7 @@ impl EffectId {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gripsight_vehicle::FIGURES;
 
     #[test]
     fn names_are_unique_and_found() {
@@ -311,6 +318,34 @@ mod tests {
         }
         assert_eq!(EffectId::by_name("magic"), None);
         assert_eq!(EffectId::candidates().count(), 34);
+    }
+
+    #[test]
+    fn figures_are_those_whose_uncertainty_may_be_stated_and_a_stated_one_counts() {
+        let mut named: Vec<&str> =
+            EffectId::ALL.iter().filter_map(|e| e.spec().figure.map(|figure| figure.name)).collect();
+        let mut known = FIGURES.to_vec();
+        named.sort_unstable();
+        known.sort_unstable();
+        assert_eq!(named, known);
+        let car = VehicleParameters::f1tenth();
+        let sigma = |figure: &str, sigma: f64| VehicleParameters {
+            sigma: [(figure.to_owned(), sigma)].into(),
+            ..car.clone()
+        };
+        // A tenth of the inertia is a tenth of the ratio; a centimetre of l_f a centimetre of shift.
+        let inertia = sigma("yaw_inertia_kgm2", 0.1 * car.yaw_inertia_kgm2);
+        approx::assert_relative_eq!(
+            EffectId::YawInertiaError.usual(&inertia, 1.0).unwrap(),
+            0.1,
+            epsilon = 1e-12
+        );
+        approx::assert_relative_eq!(
+            EffectId::CogShift.usual(&sigma("l_f_m", 0.01), 1.0).unwrap(),
+            0.01,
+            epsilon = 1e-12
+        );
+        assert_eq!(EffectId::CogShift.usual(&car, 1.0), None);
     }
 
     #[test]
