@@ -5,15 +5,16 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, bail};
-use clap::Args;
 use clap::builder::PossibleValuesParser;
+use clap::error::ErrorKind;
+use clap::{Args, Command};
 use gripsight_bag::{ReadReport, Role, TopicMap, read_sequences};
-use gripsight_diagnosis::{Diagnosis, Earlier, ExtendedModelFile, Request, Verdict, diagnose};
+use gripsight_diagnosis::{Diagnosis, Earlier, ExtendedModelFile, Request, Together, Verdict, diagnose};
 use gripsight_identification::export::{read_tires, stamp_text};
 use gripsight_identification::vehicle_hash;
 use gripsight_model::EffectId;
 use gripsight_report::{Before, GapInput, Header, TopicUse, gap_page, gap_text, topic_uses};
-use gripsight_signals::{Check, StateSequence, WindowConfig};
+use gripsight_signals::{Check, Joined, StateSequence, WindowConfig};
 use gripsight_vehicle::{TirePosterior, VehicleParameters};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -27,8 +28,8 @@ use crate::{Outcome, outputs};
 /// Explain where the model and the real car disagree.
 ///
 /// With one BAG the model is the single-track model on the tires of --pacejka, or on tires identified from the bag's training
-/// blocks. With two, BAG is compared with BAG2: what has changed from the first drive to the second. With --simulator or --simulator-bag
-/// the model is your own simulator.
+/// blocks. With two, BAG is compared with BAG2: what has changed from the first drive to the second. With --same-state several drives of a car that
+/// nobody has touched are explained together. With --simulator or --simulator-bag the model is your own simulator.
 ///
 /// DIR receives gap.json, report.html, timing.json and extended_model.yaml (the named effects with their parameters).
 /// Exit code 3: the data cannot tell.
@@ -39,6 +40,13 @@ pub(crate) struct DiagnoseArgs {
     pub(crate) bag: PathBuf,
     /// A later drive of the same car, to be compared with the first: the same as --later.
     bag2: Option<PathBuf>,
+    /// More drives, with --same-state.
+    #[arg(value_name = "BAG", requires = "same_state")]
+    more: Vec<PathBuf>,
+    /// All BAGs are drives of the car in the same state: tires, figures and effects are those of all of them, and where one contradicts the
+    /// others is said.
+    #[arg(long, requires = "bag2", conflicts_with_all = ["later", "heldout", "simulator", "simulator_bag", "predictions"])]
+    same_state: bool,
     /// A later drive of the same car: what has changed from BAG to it.
     #[arg(long, value_name = "BAG", conflicts_with_all = ["bag2", "pacejka", "extended_model"])]
     later: Option<PathBuf>,
@@ -49,14 +57,14 @@ pub(crate) struct DiagnoseArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) vehicle: Option<PathBuf>,
     /// The tires of the model: pacejka.yaml or <car>_pacejka.txt; trusted to a few percent.
-    #[arg(long, value_name = "FILE", conflicts_with = "bag2")]
+    #[arg(long, value_name = "FILE")]
     pacejka: Option<PathBuf>,
     /// The car's own tires with their uncertainty: posterior.json of an identification. On a drive that it was fitted on it is a place to start
     /// from, on another a prior.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["bag2", "later", "pacejka", "extended_model", "simulator", "simulator_bag"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["later", "pacejka", "extended_model", "simulator", "simulator_bag"])]
     posterior: Option<PathBuf>,
     /// The model to start from: extended_model.yaml of an earlier diagnosis, its effects in place at their sizes; what is left is diagnosed.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["bag2", "pacejka"])]
+    #[arg(long, value_name = "FILE", conflicts_with = "pacejka")]
     extended_model: Option<PathBuf>,
     /// Your own simulator, as a YAML file that says how to start it: what in it differs from the car, and a patch of its parameter file
     /// (DIR/simulator.patch). Effects may be left out by `--without`; its own parameters by `fixed` in the file.
@@ -82,6 +90,26 @@ pub(crate) struct DiagnoseArgs {
     /// /gripsight/extended/odom of the model with the effects found (open-loop rollouts of half a second, each from the recorded pose on).
     #[arg(long, value_name = "BAG")]
     predictions: Option<PathBuf>,
+}
+
+impl DiagnoseArgs {
+    /// Ends the program as wrong usage does where options do not go together that would with another one.
+    fn check(&self) {
+        let given = [
+            ("--pacejka", &self.pacejka),
+            ("--posterior", &self.posterior),
+            ("--extended-model", &self.extended_model),
+        ];
+        let given = given.iter().find(|(_, file)| file.is_some()).map(|(name, _)| name);
+        if let (Some(name), Some(_), false) = (given, &self.bag2, self.same_state) {
+            let says = format!(
+                "{name} cannot be used with [BAG2], which is compared with BAG, without --same-state"
+            );
+            Self::augment_args(Command::new("gripsight diagnose"))
+                .error(ErrorKind::ArgumentConflict, says)
+                .exit();
+        }
+    }
 }
 
 fn effects() -> PossibleValuesParser {
@@ -126,14 +154,18 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
     if let Some(file) = &args.simulator {
         return crate::simulator::run(args, file);
     }
+    args.check();
     let start = Instant::now();
     // The drive that is explained is the later one or the car's, from the model of the earlier one or the simulator's.
-    let (subject, other) = match (args.later.as_ref().or(args.bag2.as_ref()), &args.simulator_bag) {
+    let together: Vec<&PathBuf> =
+        if args.same_state { args.bag2.iter().chain(&args.more).collect() } else { Vec::new() };
+    let later = args.later.as_ref().or(args.bag2.as_ref().filter(|_| !args.same_state));
+    let (subject, other) = match (later, &args.simulator_bag) {
         (Some(later), _) => (later, Some(&args.bag)),
         (None, simulator) => (&args.bag, simulator.as_ref()),
     };
-    let bags: Vec<&Path> =
-        [Some(subject), other, args.heldout.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
+    let bags = [Some(subject), other, args.heldout.as_ref()].into_iter().flatten();
+    let bags: Vec<&Path> = bags.chain(together.iter().copied()).map(PathBuf::as_path).collect();
     outputs::check(&args.out, &FILES, args.predictions.as_deref(), &bags)?;
     let topics = args.topics.as_deref().map(TopicMap::read).transpose()?.unwrap_or_default();
     let vehicle = vehicle(args.vehicle.as_deref())?;
@@ -146,7 +178,17 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
             .with_context(|| format!("cannot diagnose {}", path.display()))?;
         Ok((sequence, report, recorded))
     };
-    let (sequence, report, recorded) = usable(subject)?;
+    let (mut sequence, report, recorded) = usable(subject)?;
+    let beside = together.iter().map(|path| usable(path)).collect::<anyhow::Result<Vec<_>>>()?;
+    let alone: Vec<StateSequence> =
+        std::iter::once(&sequence).chain(beside.iter().map(|b| &b.0)).cloned().collect();
+    let joined = Joined::of(&alone).context("these bags cannot be explained together")?;
+    if args.same_state {
+        sequence = joined.sequence;
+        // Drives begin at places of their own: where they were says nothing of all of them.
+        sequence.x_m.clear();
+        sequence.y_m.clear();
+    }
     let first = other.map(|path| usable(path)).transpose()?;
     let held_out = args.heldout.as_deref().map(usable).transpose()?;
     let reading_s = start.elapsed().as_secs_f64();
@@ -157,7 +199,7 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         spinner.tick();
         tracing::debug!("{stage}");
     };
-    let alone = |sequence| Request {
+    let of = |sequence| Request {
         tires,
         posterior: posterior.as_ref(),
         model: model.as_ref(),
@@ -165,28 +207,35 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         only: &args.only,
         ..Request::new(sequence, &vehicle)
     };
-    let earlier = first.as_ref().map(|first| Earlier::diagnosed(&alone(&first.0), &mut progress));
+    let earlier = first.as_ref().map(|first| Earlier::diagnosed(&of(&first.0), &mut progress));
     let earlier = earlier
         .transpose()
         .with_context(|| format!("cannot diagnose {}", other.unwrap_or(subject).display()))?;
-    let request =
-        Request { held_out: held_out.as_ref().map(|h| &h.0), earlier: earlier.as_ref(), ..alone(&sequence) };
-    let result = diagnose(&request, &mut progress)
+    let request = Request {
+        held_out: held_out.as_ref().map(|h| &h.0),
+        earlier: earlier.as_ref(),
+        together: args.same_state.then_some(Together { alone: &alone, spans_s: &joined.spans_s }),
+        ..of(&sequence)
+    };
+    let mut result = diagnose(&request, &mut progress)
         .with_context(|| format!("cannot diagnose {}", subject.display()))?;
+    for (drive, path) in result.drives.iter_mut().zip(std::iter::once(&subject).chain(&together)) {
+        drive.name = file_name(path);
+    }
     spinner.finish_and_clear();
     let diagnosing_s = start.elapsed().as_secs_f64() - reading_s;
-    let header = header(subject, &vehicle, &sequence);
+    let mut header = header(subject, &vehicle, &sequence);
+    together.iter().for_each(|path| header.bag = format!("{}, {}", header.bag, file_name(path)));
     let compared_with = other.map(|path| file_name(path));
     let before = compared_with.as_deref().map(|name| match args.simulator_bag {
         Some(_) => Before::Simulator(name),
         None => Before::Drive(name),
     });
     let mut notes = [read_notes(&report), signal_notes(&recorded)].concat();
-    for (path, beside) in [(other, &first), (args.heldout.as_ref(), &held_out)] {
-        if let (Some(path), Some((_, report, recorded))) = (path, beside) {
-            let all = [read_notes(report), signal_notes(recorded)].concat();
-            notes.extend(all.iter().map(|note| format!("{}: {note}", file_name(path))));
-        }
+    let others = other.zip(first.as_ref()).into_iter().chain(args.heldout.as_ref().zip(held_out.as_ref()));
+    for (path, (_, report, recorded)) in others.chain(together.iter().copied().zip(&beside)) {
+        let all = [read_notes(report), signal_notes(recorded)].concat();
+        notes.extend(all.iter().map(|note| format!("{}: {note}", file_name(path))));
     }
     let page = gap_page(&GapInput {
         diagnosis: &result,

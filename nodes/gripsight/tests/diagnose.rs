@@ -63,6 +63,21 @@ fn a_recording_is_never_written_over_and_folders_are_looked_at_first() {
 }
 
 #[test]
+fn what_does_not_go_with_two_drives_is_wrong_usage() {
+    let folder = tempfile::tempdir().unwrap();
+    for (arguments, why) in [
+        ("a.mcap b.mcap --pacejka t.yaml", "--pacejka cannot be used with [BAG2]"),
+        ("a.mcap b.mcap --posterior t.json", "--posterior cannot be used with [BAG2]"),
+        ("a.mcap b.mcap c.mcap", "--same-state"),
+        ("a.mcap --same-state", "<BAG2>"),
+        ("a.mcap b.mcap --same-state --later c.mcap", "cannot be used with"),
+    ] {
+        let (code, error) = gripsight(folder.path(), &format!("diagnose {arguments} --out out"));
+        assert!(code == 2 && error.contains(why), "{arguments}: {code} {error}");
+    }
+}
+
+#[test]
 fn an_effect_that_is_not_in_the_library_is_wrong_usage() {
     let folder = tempfile::tempdir().unwrap();
     for option in ["--without", "--only"] {

@@ -2,8 +2,8 @@
 
 use anyhow::{Context, bail};
 use gripsight_bag::{TopicMap, read_sequences};
-use gripsight_identification::{Config, Outcome, ResidualKind, disagreements, identify, join};
-use gripsight_signals::{StateSequence, WindowConfig};
+use gripsight_identification::{Config, Outcome, ResidualKind, disagreements, identify};
+use gripsight_signals::{Joined, StateSequence, WindowConfig};
 use gripsight_vehicle::VehicleParameters;
 
 use super::IdentifyArgs;
@@ -32,7 +32,8 @@ pub(super) fn read(
     if alone.len() != args.bags.len() {
         bail!("{} bags hold {} sequences: give bags of odometry, a drive each", args.bags.len(), alone.len());
     }
-    Ok((vec![join(&alone).context("these bags cannot be identified together")?], alone))
+    let joined = Joined::of(&alone).context("these bags cannot be identified together")?;
+    Ok((vec![joined.sequence], alone))
 }
 
 /// Says where a bag alone gives something else than all together.

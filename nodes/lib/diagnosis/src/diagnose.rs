@@ -9,14 +9,14 @@ use crate::budget::{Budget, CANDIDATES, Models, Scorer, large_slip_rad};
 use crate::engine::Engine;
 use crate::figures::figures;
 use crate::finding::{detection_limits, ranked, sites};
-use crate::infer::{Inferred, infer, linearised};
-use crate::outcome::{Diagnosis, Inference, Invisible, TirePair, Verdict};
+use crate::infer::{Inferred, infer};
+use crate::outcome::{Diagnosis, Inference, Invisible, TirePair};
 use crate::posterior::{is_of, trust, usual};
 use crate::state::State;
 use crate::trust::TireTrust;
 use crate::usable::{Usable, cannot_tell, refused, usable};
 use crate::verdict::{decide, drive_next, errors, record_next};
-use crate::{Earlier, ExtendedModelFile, GapError, noise, pictures, place, plausible};
+use crate::{Earlier, ExtendedModelFile, GapError, Together, drives, noise, pictures, place, plausible};
 
 /// What is diagnosed, and with what.
 #[derive(Debug, Clone)]
@@ -27,6 +27,8 @@ pub struct Request<'a> {
     pub held_out: Option<&'a StateSequence>,
     /// A drive from before, in place of `tires` and `model`: what has changed since is diagnosed.
     pub earlier: Option<&'a Earlier>,
+    /// The drives that `sequence` joins, where it is not one drive.
+    pub together: Option<Together<'a>>,
     /// The car as the model has it.
     pub vehicle: &'a VehicleParameters,
     /// The tires as the model has them, and trusted to a few percent; `None`: identified from the training blocks.
@@ -49,6 +51,7 @@ impl<'a> Request<'a> {
             sequence,
             held_out: None,
             earlier: None,
+            together: None,
             vehicle,
             tires: None,
             posterior: None,
@@ -77,8 +80,6 @@ const GENERIC: [[f64; 8]; 3] = [
 ];
 /// Windows that the inference works on, at most.
 pub(crate) const SEARCH_WINDOWS: usize = 70;
-/// How often a later drive is linearised to be compared with an earlier one.
-const COMPARISONS: usize = 2;
 /// Iterations of the fits on all training blocks.
 const FINAL_ITERATIONS: usize = 15;
 
@@ -90,7 +91,17 @@ const FINAL_ITERATIONS: usize = 15;
 pub fn diagnose(request: &Request<'_>, progress: &mut dyn FnMut(&str)) -> Result<Diagnosis, GapError> {
     let data_health = DataHealth::of(request.sequence)?;
     match usable(request, &data_health) {
-        Ok(usable) => Ok(explain(request, usable, data_health, progress)?.0),
+        Ok(usable) => {
+            let recording = request.together.is_some().then(|| usable.recording.clone());
+            let (diagnosis, inferred) = explain(request, usable, data_health, progress)?;
+            let (Some(together), Some(recording)) = (&request.together, recording) else {
+                return Ok(diagnosis);
+            };
+            let mut all = Earlier::of(diagnosis, inferred, recording);
+            let contradicts = drives::contradictions(&all, together, request, progress)?;
+            all.diagnosis.drives.iter_mut().zip(contradicts).for_each(|(d, c)| d.contradicts = c);
+            Ok(all.diagnosis)
+        }
         Err(error) if cannot_tell(&error) => Ok(refused(request, &error, data_health)),
         Err(error) => Err(error),
     }
@@ -138,29 +149,8 @@ pub(crate) fn explain(
         }
         Some(earlier) => {
             progress("comparing the drives");
-            // Both drives in the same columns, around the same tires, with nothing held.
-            let like = &earlier.inferred;
-            let mut alike = Engine::new(&recording, request.vehicle, like.tires, TireTrust::file());
-            let (mut values, mut chosen) = (like.values.clone(), like.chosen.clone());
-            let mut compared = None;
-            // First where the earlier drive was linearised: fits may end apart although nothing has changed. Where something has, around the
-            // later drive's own fits: from the earlier model on, then from what that comparison makes of it.
-            for comparison in 0..=COMPARISONS {
-                let at = (&values[..], &chosen[..]);
-                let later = linearised(&mut alike, like, at, comparison > 0, &search_windows)
-                    .ok_or(GapError::NotFinite)?;
-                let differences = earlier.compared(&alike, &later).ok_or(GapError::NotFinite)?;
-                let same = differences.verdict() == Verdict::NoGap;
-                if comparison > 0 {
-                    (values, chosen) = differences.later(&alike, earlier);
-                }
-                compared = Some((later, differences));
-                if same {
-                    break;
-                }
-            }
-            let (later, differences) = compared.ok_or(GapError::NotFinite)?;
-            engine.sigma.clone_from(&alike.sigma);
+            let (later, differences) = earlier.with_later(&recording, request.vehicle, &windows.training)?;
+            engine.sigma.clone_from(&later.sigma);
             (later, Some((earlier, differences)))
         }
     };
@@ -213,6 +203,7 @@ pub(crate) fn explain(
         sites: sites(&inferred, &effects),
         effects,
         changes: differences.map(|(_, d)| d.changes).unwrap_or_default(),
+        drives: request.together.map_or_else(Vec::new, |t| drives::errors(&t, &scorer, &null, &model)),
         invisible,
         detection_limits: detection_limits(&engine, &inferred),
         figures: figures(&engine, &inferred),

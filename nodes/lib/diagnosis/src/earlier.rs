@@ -1,20 +1,25 @@
 //! A drive from before: what a later one of the same car is compared with.
 
+use gripsight_estimation::Windows;
 use gripsight_model::{EffectId, Recording};
 
 use crate::answer::Change;
 use crate::budget::Budget;
 use crate::changes::{Compared, compare};
 use crate::decisions;
-use crate::diagnose::explain;
+use crate::diagnose::{SEARCH_WINDOWS, explain};
 use crate::engine::Engine;
-use crate::infer::Inferred;
+use crate::infer::{Inferred, linearised};
 use crate::outcome::{Diagnosis, RankedEffect};
 use crate::sizes::{Sized, reported};
 use crate::trust::TireTrust;
 use crate::usable::usable;
 use crate::{GapError, Request, Verdict};
 use gripsight_signals::DataHealth;
+use gripsight_vehicle::VehicleParameters;
+
+/// How often another drive is linearised anew to be compared.
+const COMPARISONS: usize = 2;
 
 /// A drive from before with its own diagnosis. A later drive is compared with all that was found in it: tires, effects, and what they left.
 #[derive(Debug, Clone)]
@@ -38,7 +43,12 @@ impl Earlier {
         if diagnosis.verdict == Verdict::NotIdentifiable {
             return Err(GapError::Earlier(diagnosis.reasons.join("; ")));
         }
-        Ok(Self { diagnosis, inferred, recording })
+        Ok(Self::of(diagnosis, inferred, recording))
+    }
+
+    /// A drive that has its diagnosis.
+    pub(crate) fn of(diagnosis: Diagnosis, inferred: Inferred, recording: Recording) -> Self {
+        Self { diagnosis, inferred, recording }
     }
 
     /// What it was explained with, in words.
@@ -55,8 +65,40 @@ impl Earlier {
         self.recording.channels == later.channels && self.recording.has_command == later.has_command
     }
 
+    /// Compares another drive of the car with it: both in the same columns, around the same tires, with nothing held. Gives the other drive, linearised
+    /// there, and what differs.
+    pub(crate) fn with_later(
+        &self,
+        recording: &Recording,
+        vehicle: &VehicleParameters,
+        training: &Windows,
+    ) -> Result<(Inferred, Differences), GapError> {
+        let windows = training.thinned(SEARCH_WINDOWS);
+        let like = &self.inferred;
+        let mut alike = Engine::new(recording, vehicle, like.tires, TireTrust::file());
+        let (mut values, mut chosen) = (like.values.clone(), like.chosen.clone());
+        let mut compared = None;
+        // First where the earlier drive was linearised: fits may end apart although nothing has changed. Where something has, around the
+        // later drive's own fits: from the earlier model on, then from what that comparison makes of it.
+        for comparison in 0..=COMPARISONS {
+            let at = (&values[..], &chosen[..]);
+            let later =
+                linearised(&mut alike, like, at, comparison > 0, &windows).ok_or(GapError::NotFinite)?;
+            let differences = self.compared(&alike, &later).ok_or(GapError::NotFinite)?;
+            let same = differences.verdict() == Verdict::NoGap;
+            if comparison > 0 {
+                (values, chosen) = differences.later(&alike, self);
+            }
+            compared = Some((later, differences));
+            if same {
+                break;
+            }
+        }
+        compared.ok_or(GapError::NotFinite)
+    }
+
     /// What differs in a later drive that was linearised in the same columns.
-    pub(crate) fn compared(&self, later: &Engine<'_>, inferred: &Inferred) -> Option<Differences> {
+    fn compared(&self, later: &Engine<'_>, inferred: &Inferred) -> Option<Differences> {
         let engine = Engine::new(&self.recording, later.vehicle, self.inferred.tires, TireTrust::drive());
         let compared = compare(&engine, &self.inferred, inferred)?;
         let changes = compared.changes(&self.inferred);
@@ -82,6 +124,12 @@ pub(crate) struct Differences {
 }
 
 impl Differences {
+    /// The changes that are likelier than not.
+    pub(crate) fn likely(self) -> Vec<Change> {
+        let effect = |c: &Change| EffectId::by_name(c.name).is_none_or(|e| self.accepted.contains(&e));
+        self.changes.iter().filter(|c| c.probability >= decisions::LIKELY && effect(c)).cloned().collect()
+    }
+
     /// The later drive's most probable model: its values, and the terms that it has.
     pub(crate) fn later(&self, engine: &Engine<'_>, earlier: &Earlier) -> (Vec<f64>, Vec<usize>) {
         self.compared.later(engine, &earlier.inferred)

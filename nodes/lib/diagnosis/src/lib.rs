@@ -17,6 +17,9 @@
 //! 6. Two drives are compared by differences ([`Earlier`], `changes`): every parameter is in both, and only what one has and the other has not
 //!    is a change, whatever either leaves unexplained.
 //!
+//! 7. Several drives of one car in one state ([`Together`]) are explained as one, and each is then compared with all of them as in 6: what differs there
+//!    contradicts the others.
+//!
 //! Every number that the answer rests on stands in `decisions`.
 
 mod answer;
@@ -27,6 +30,7 @@ mod correct;
 mod decisions;
 mod diagnose;
 mod discrepancy;
+mod drives;
 mod earlier;
 mod engine;
 mod error;
@@ -57,6 +61,7 @@ mod verdict;
 pub use answer::{Change, MechanismAnswer, SiteAnswer};
 pub use correct::without_effects;
 pub use diagnose::{Request, diagnose};
+pub use drives::{DriveAnswer, Together};
 pub use earlier::Earlier;
 pub use error::GapError;
 pub use extended_file::ExtendedModelFile;

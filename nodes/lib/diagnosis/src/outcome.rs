@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use crate::ExtendedModelFile;
 use crate::answer::{Change, SiteAnswer};
+use crate::drives::DriveAnswer;
 use crate::figures::FigureAnswer;
 
 /// What a diagnosis comes to.
@@ -261,6 +262,8 @@ pub struct Diagnosis {
     pub sites: Vec<SiteAnswer>,
     /// What differs from the earlier drive, the likeliest first; empty without one.
     pub changes: Vec<Change>,
+    /// Of several drives that were explained together: what each says of that; else empty.
+    pub drives: Vec<DriveAnswer>,
     /// Effects that these signals cannot show.
     pub invisible: Vec<Invisible>,
     /// Sizes from which effects would show.

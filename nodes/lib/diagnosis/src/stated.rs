@@ -317,11 +317,11 @@ mod tests {
             term: 0,
             untried: 0,
             held_out_log_ratio: 0.0,
-            size_over_half_width: 1.0,
+            size_over_half_width: 0.7,
             closes: 0.01,
             over_unexplained: 0.1,
         };
-        assert!(weak.chance() < 0.2, "{}", weak.chance());
+        assert!(weak.chance() < 0.1, "{}", weak.chance());
         let strong =
             Statement { size_over_half_width: 8.0, closes: 0.5, over_unexplained: f64::INFINITY, ..weak };
         assert!(strong.chance() > 0.8, "{}", strong.chance());

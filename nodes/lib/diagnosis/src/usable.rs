@@ -69,6 +69,7 @@ pub(crate) fn refused(request: &Request<'_>, error: &GapError, data_health: Data
         effects: Vec::new(),
         sites: Vec::new(),
         changes: Vec::new(),
+        drives: Vec::new(),
         invisible: Vec::new(),
         detection_limits: Vec::new(),
         figures: Vec::new(),

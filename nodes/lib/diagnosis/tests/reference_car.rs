@@ -5,10 +5,10 @@
 mod common;
 
 use common::{drive, drive_at, nominal, text};
-use gripsight_diagnosis::{Diagnosis, Earlier, GapError, Request, Verdict, diagnose, own_tires};
+use gripsight_diagnosis::{Diagnosis, Earlier, GapError, Request, Together, Verdict, diagnose, own_tires};
 use gripsight_model::ModelError;
 use gripsight_reference_car::CarParameters;
-use gripsight_signals::StateSequence;
+use gripsight_signals::{Joined, StateSequence};
 use gripsight_vehicle::TirePosterior;
 
 const DURATION_S: f64 = 30.0;
@@ -154,6 +154,37 @@ fn of_two_drives_only_what_has_changed_is_told() {
     assert_eq!(named(&gone), ["steering_delay"], "{}", text(&gone));
     let delay_s = gone.effects[0].parameters["delay_s"].clone();
     assert!(delay_s.low <= 0.0 && delay_s.high < 0.01 && delay_s.before.unwrap() > 0.035, "{delay_s:?}");
+}
+
+#[test]
+fn drives_in_one_state_are_explained_together_and_one_in_another_contradicts() {
+    const LAG: &str = "steering_lag=0.08";
+    let small = CarParameters::by_name("f1tenth").unwrap();
+    let vehicle = nominal(&small);
+    let alone = [(&[LAG][..], 36), (&[LAG], 37), (&[], 38)]
+        .map(|(effects, seed)| drive_at(&small, effects, 0.8, 20.0, seed).unwrap());
+    let explained = |alone: &[StateSequence]| {
+        let joined = Joined::of(alone).unwrap();
+        let together = Together { alone, spans_s: &joined.spans_s };
+        let request = Request { together: Some(together), ..Request::new(&joined.sequence, &vehicle) };
+        diagnose(&request, &mut |_| {}).unwrap()
+    };
+    let differs =
+        |d: &Diagnosis| d.drives.iter().map(|d| d.contradicts.iter().map(|c| c.name).collect()).collect();
+    let alike = explained(&alone[..2]);
+    assert_eq!(named(&alike), ["steering_lag"], "{}", text(&alike));
+    let nothing: Vec<Vec<&str>> = vec![Vec::new(); 2];
+    assert_eq!(nothing, differs(&alike) as Vec<Vec<&str>>, "{}", text(&alike));
+    for drive in &alike.drives {
+        assert!(
+            (drive.duration_s - 20.0).abs() < 0.5 && drive.after.value < drive.retuned.value,
+            "{drive:?}"
+        );
+    }
+    let mixed = explained(&alone);
+    let contradicts: Vec<Vec<&str>> = differs(&mixed);
+    assert!(contradicts[2].contains(&"steering_lag"), "{}", text(&mixed));
+    assert!(mixed.drives[2].contradicts[0].difference.value < -0.04, "{:?}", mixed.drives[2]);
 }
 
 #[test]

@@ -48,4 +48,4 @@ pub use residual::train_residual;
 pub use residual_model::{INPUTS, OUTPUTS, ResidualModel};
 pub use rollout::Nuisance;
 pub use run::{Identification, Next, Stage, Started, Swept, identify};
-pub use together::{AxleCheck, Disagreement, Verification, disagreements, join, verify};
+pub use together::{AxleCheck, Disagreement, Verification, disagreements, verify};

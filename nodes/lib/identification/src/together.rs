@@ -1,57 +1,14 @@
-//! Several drives of one car: identified together, and set against each other; and a set tried on another drive.
+//! Several drives of one car set against what they give together; and a set tried on another drive.
 
-use gripsight_signals::{Clock, StateSequence};
 use gripsight_vehicle::{MagicFormula, PacejkaParameters};
 
 use crate::conclude::unstable_at_mps;
-use crate::{IdentificationError, Outcome, PerAxle, Status, TireCurve, ValidWithin};
+use crate::{Outcome, PerAxle, Status, TireCurve, ValidWithin};
 
-/// Drives that are put together lie this far apart: a gap for whatever looks at them, longer than any delay.
-const APART_S: f64 = 10.0;
-/// Drives are recorded alike when their time steps differ by less than this share.
-const SAME_STEP: f64 = 0.05;
 /// A difference in force matters from this share of the largest force on: what counts as a promise too high.
 const HARMFUL: f64 = 0.1;
 /// Points that two curves are compared at.
 const POINTS: usize = 40;
-
-/// Drives of one car as one sequence, one after the other with a gap between. Channels that one of them lacks are left out.
-///
-/// # Errors
-/// [`IdentificationError::Setting`] for drives that were recorded at different rates, or no drive at all.
-pub fn join(drives: &[StateSequence]) -> Result<StateSequence, IdentificationError> {
-    let Some(first) = drives.first() else {
-        return Err(IdentificationError::Setting { name: "number of drives", got: 0.0, must: "at least 1" });
-    };
-    let step_s = |s: &StateSequence| s.duration_s() / s.len().saturating_sub(1).max(1) as f64;
-    if let Some(other) = drives.iter().find(|s| (step_s(s) / step_s(first) - 1.0).abs() > SAME_STEP) {
-        let (name, must) =
-            ("time step of a drive in s", "that of the first, to 5 %: resample it, or identify it alone");
-        return Err(IdentificationError::Setting { name, got: step_s(other), must });
-    }
-    let mut all = first.clone();
-    for drive in &drives[1..] {
-        let after_s = (all.duration_s() + APART_S) as f32;
-        for ((channel, values), (_, more)) in all.table_mut().into_iter().zip(drive.table()) {
-            if values.is_empty() || more.is_empty() {
-                values.clear();
-            } else if channel.name.ends_with("time_s") {
-                values.extend(more.iter().map(|t| t + after_s));
-            } else {
-                values.extend(more);
-            }
-        }
-    }
-    // A clock without its stamps has no channels.
-    for clock in Clock::ALL {
-        let stamped =
-            all.table().iter().any(|(c, v)| c.clock == clock && c.name.ends_with("time_s") && !v.is_empty());
-        if !stamped {
-            all.table_mut().into_iter().filter(|(c, _)| c.clock == clock).for_each(|(_, v)| v.clear());
-        }
-    }
-    Ok(all)
-}
 
 /// Where a drive alone says something else than all of them together.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -184,34 +141,4 @@ pub fn verify(set: &PacejkaParameters, valid: Option<&ValidWithin>, drive: &Outc
         ));
     }
     Verification { axles, against }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn drive(n: usize, v_y: f32) -> StateSequence {
-        let time_s = (0..n).map(|k| k as f32 * 0.01).collect();
-        let filled = |v: f32| vec![v; n];
-        StateSequence {
-            time_s,
-            v_x_mps: filled(3.0),
-            v_y_mps: filled(v_y),
-            yaw_rate_radps: filled(0.1),
-            steering_rad: filled(0.0),
-            ..StateSequence::default()
-        }
-    }
-
-    #[test]
-    fn drives_follow_each_other_and_keep_what_all_of_them_have() {
-        let (a, b) = (drive(100, 1.0), StateSequence { a_x_mps2: vec![0.0; 50], ..drive(50, 2.0) });
-        let all = join(&[a.clone(), b]).unwrap();
-        assert_eq!((all.len(), all.a_x_mps2.len()), (150, 0));
-        assert!(f64::from(all.time_s[100] - all.time_s[99]) > 0.99 * APART_S);
-        assert_eq!((all.v_y_mps[99], all.v_y_mps[100]), (1.0, 2.0));
-        assert_eq!(join(std::slice::from_ref(&a)).unwrap(), a);
-        let slow = StateSequence { time_s: (0..50).map(|k| k as f32 * 0.02).collect(), ..drive(50, 2.0) };
-        assert!(join(&[a, slow]).is_err() && join(&[]).is_err());
-    }
 }

@@ -6,8 +6,8 @@
 use std::collections::BTreeMap;
 
 use gripsight_diagnosis::{
-    Change, Diagnosis, EffectParameter, ExtendedModelFile, GapBudget, GapStep, Invisible, MechanismAnswer,
-    Place, Prediction, RankedEffect, Series, SiteAnswer, TirePair, Verdict, Where,
+    Change, Diagnosis, DriveAnswer, EffectParameter, ExtendedModelFile, GapBudget, GapStep, Invisible,
+    MechanismAnswer, Place, Prediction, RankedEffect, Series, SiteAnswer, TirePair, Verdict, Where,
 };
 use gripsight_estimation::Estimate;
 use gripsight_model::{Identity, Need};
@@ -80,6 +80,7 @@ fn diagnosis() -> Diagnosis {
             },
             probability: 0.97,
         }],
+        drives: Vec::new(),
         invisible: vec![Invisible {
             need: Need::LongitudinalCommand,
             name: "aero_drag",
@@ -279,6 +280,28 @@ fn each_site_is_told_with_its_mechanisms_their_sizes_and_what_remains() {
     let quiet = Diagnosis { sites: Vec::new(), changes: Vec::new(), ..diagnosis() };
     assert!(gap_text(&quiet, None, &[]).contains("nothing is the matter"));
     assert!(page(&diagnosis()).contains("Where something is the matter"));
+}
+
+#[test]
+fn of_several_drives_each_says_whether_it_agrees() {
+    let mut d = diagnosis();
+    let drive = |name: &str, contradicts| DriveAnswer {
+        name: name.to_owned(),
+        duration_s: 31.0,
+        retuned: estimate(8.0, 1.5),
+        after: estimate(3.1, 0.5),
+        contradicts,
+    };
+    d.drives = vec![drive("a.mcap", Vec::new()), drive("b.mcap", std::mem::take(&mut d.changes))];
+    let text = gap_text(&d, None, &[]);
+    let line = |name: &str| text.lines().find(|l| l.contains(name)).unwrap();
+    assert!(line("a.mcap").starts_with("drives ") && line("a.mcap").ends_with("agrees with the others"));
+    let said =
+        "contradicts the others: something with the steering chain that the library lacks differs: 97 %";
+    assert!(line("b.mcap, 31 s").ends_with(said), "{text}");
+    let html = page(&d);
+    assert!(html.contains("Drive by drive") && html.contains(said));
+    assert!(!page(&diagnosis()).contains("Drive by drive"));
 }
 
 #[test]

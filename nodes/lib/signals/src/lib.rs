@@ -13,6 +13,7 @@ mod checks;
 mod error;
 mod excitation;
 mod health;
+mod joined;
 mod layout;
 mod mask;
 mod measurement;
@@ -30,6 +31,7 @@ pub use checks::{Check, Checks, Finding, Pair, Unchecked, cross_check, lateral_s
 pub use error::SignalError;
 pub use excitation::Excitation;
 pub use health::{DataHealth, FrozenSpan, Gap, stands_still};
+pub use joined::Joined;
 pub use layout::Layout;
 pub use mask::{BadKind, BadSpan, Masked, masked};
 pub use measurement::{

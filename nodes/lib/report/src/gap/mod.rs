@@ -1,6 +1,7 @@
 //! The page of a diagnosis: where model and real car disagree, why, and by how much.
 
 mod budget;
+mod drives;
 mod figures;
 mod pictures;
 mod sites;
@@ -45,6 +46,7 @@ pub fn gap_page(input: &GapInput<'_>) -> Result<String, ReportError> {
         @if d.verdict == Verdict::NotIdentifiable {
             (section("Drive or record next", true, &next(d)))
         } @else {
+            @if !d.drives.is_empty() { (section("Drive by drive", true, &drives::table(d))) }
             @if input.before.is_some() { (section("What has changed", true, &sites::changes(d))) }
             (explained(d)?)
         }

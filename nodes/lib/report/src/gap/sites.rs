@@ -118,6 +118,15 @@ fn sized((name, p): (&&'static str, &EffectParameter)) -> String {
 
 /// A change between two drives in one line.
 fn change_line(change: &Change) -> String {
+    differing(change, "has changed")
+}
+
+/// What differs in a drive from others, in some words.
+pub(super) fn change_words(change: &Change) -> String {
+    differing(change, "differs")
+}
+
+fn differing(change: &Change, verb: &str) -> String {
     let what = if change.name == "other" {
         format!("something with {} that the library lacks", place(change.site))
     } else {
@@ -129,7 +138,7 @@ fn change_line(change: &Change) -> String {
     } else {
         String::new()
     };
-    format!("{what} has changed{size}: {}", percent(change.probability))
+    format!("{what} {verb}{size}: {}", percent(change.probability))
 }
 
 /// A site as people call it.

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use gripsight_diagnosis::{Diagnosis, Place, Verdict};
 use gripsight_estimation::Estimate;
 
+use super::drives;
 use super::figures;
 use super::sites;
 use super::verdict::{Before, sentence};
@@ -43,6 +44,7 @@ pub fn gap_text(d: &Diagnosis, before: Option<Before<'_>>, data_notes: &[String]
         let _ = writeln!(out, "identity   {}: {}", identity.name, identity.finding);
     }
     budget(&mut out, d);
+    drives::lines(&mut out, d);
     sites::lines(&mut out, d);
     figures::lines(&mut out, d);
     effects(&mut out, d);

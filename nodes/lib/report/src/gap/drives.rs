@@ -1,0 +1,61 @@
+//! Several drives explained together: what each says of that.
+
+use std::fmt::Write;
+
+use gripsight_diagnosis::{Diagnosis, DriveAnswer};
+use gripsight_estimation::Estimate;
+use maud::{Markup, html};
+
+use super::sites::change_words;
+use super::words::figure;
+use crate::text::fixed;
+
+/// For a terminal: a line each.
+pub(super) fn lines(out: &mut String, d: &Diagnosis) {
+    let mut head = "drives";
+    for drive in &d.drives {
+        let _ = writeln!(
+            out,
+            "{head:<10} {}, {} s: {} times the noise with other tires, {} with what is named; {}",
+            drive.name,
+            fixed(drive.duration_s, 0),
+            known(&drive.retuned),
+            known(&drive.after),
+            contradicts(drive)
+        );
+        head = "";
+    }
+}
+
+/// As a table.
+pub(super) fn table(d: &Diagnosis) -> Markup {
+    html! {
+        table {
+            thead { tr { th { "Drive" } th { "Length" } th { "Error with other tires" } th { "With what is named" } th { "Beside all of them" } } }
+            tbody {
+                @for drive in &d.drives {
+                    tr class=[(!drive.contradicts.is_empty()).then_some("named")] {
+                        td { (drive.name) }
+                        td { (fixed(drive.duration_s, 0)) " s" }
+                        td { (known(&drive.retuned)) }
+                        td { (known(&drive.after)) }
+                        td { (contradicts(drive)) }
+                    }
+                }
+            }
+        }
+        p { "Mean squared errors over the noise of the stretches of each drive that nothing was fitted to, with their 90 % intervals." }
+    }
+}
+
+fn known(error: &Estimate) -> String {
+    if error.value.is_finite() { figure(error) } else { "–".to_owned() }
+}
+
+fn contradicts(drive: &DriveAnswer) -> String {
+    if drive.contradicts.is_empty() {
+        return "agrees with the others".to_owned();
+    }
+    let said: Vec<String> = drive.contradicts.iter().map(change_words).collect();
+    format!("contradicts the others: {}", said.join("; "))
+}
