@@ -2,6 +2,7 @@
 # The loop closed: the reference car on roads that it does not know, from mu = 0.51, driven and identified in turns.
 # Usage: launch_scripts/closed_loop.sh OUT [--quick] [more options; --help lists them]
 # Writes OUT/laps.csv (a row a lap) and OUT/summary.md, which also goes to standard output. --quick: minutes instead of an hour.
+# What OUT/laps.csv holds already is not driven again: a run that was broken off goes on.
 set -euo pipefail
 out=${1:?usage: launch_scripts/closed_loop.sh OUT [--quick]}
 shift

@@ -2,7 +2,7 @@
 //!
 //! | what is known | grip planned with |
 //! | --- | --- |
-//! | nothing | the start's |
+//! | nothing | half of the start's, and a step beyond what the car turned with, up to the start's |
 //! | accepted: the peak is known | a share of the most likely peak, step by step from what the set promises |
 //! | accepted within what was shown | a step beyond what was driven, so that the next drive shows more, up to the most likely peak |
 //! | a prior's peak (provisional) | up to that and to the peak that the data find most likely, in larger steps |
@@ -59,6 +59,12 @@ const LATEST_S: f64 = 0.5;
 const OLDEST_S: f64 = 0.2;
 /// Share of the most likely peak to explore up to, where it was not reached.
 const LIKELY: f64 = 0.96;
+/// Share of an assumed grip to begin with: what nobody measured is no promise.
+const CAREFUL: f64 = 0.5;
+/// Grip planned over what the car turned with, up to an assumed grip.
+const ASSURED: f64 = 1.2;
+/// Share of the planned grip up to which the plan may grow: not in the middle of a corner.
+const GENTLE: f64 = 0.7;
 /// Share of what the road gave when the car slid, to go on with.
 const CAUGHT: f64 = 0.96;
 /// Growth of that with each part of a lap driven, as the slide may have been a puddle.
@@ -67,6 +73,8 @@ const REGAINED: f64 = 1.01;
 const WARNED: f64 = 0.7;
 /// Share of the drive that is always left: cornering alone slows the car.
 const LEAST_DRIVE: f64 = 0.5;
+/// Share of the brakes that is always left: a car that pushes over its front wheels gets slower or leaves.
+const LEAST_BRAKE: f64 = 0.5;
 /// Most that the driver drives against a slide sideways: more upsets a car at its limit.
 const SLIDE_MPS2: f64 = 0.5;
 /// Share of the half width from which the car slows down.
@@ -84,6 +92,8 @@ pub struct Driver {
     prior: Option<TireSet>,
     /// Grip planned with over the last part of a lap that ended without a slide.
     driven: f64,
+    /// Largest grip that the car turned with while nothing was known.
+    turned: f64,
     /// Grip that the road gave where it was less than planned.
     caught: Option<f64>,
     actuator: Actuator,
@@ -108,7 +118,9 @@ impl Driver {
         settings: Settings,
     ) -> Result<Self, DrivingError> {
         start.check()?;
-        let plan = Plan::new(&vehicle, &drivetrain, &track, &start.tires, settings.share * start.grip());
+        let careful = if start.trust == Trust::Assumed { CAREFUL } else { 1.0 };
+        let first = careful * settings.share * start.grip();
+        let plan = Plan::new(&vehicle, &drivetrain, &track, &start.tires, first);
         let progress = Progress::new(track.length_m(), plan.grip);
         Ok(Self {
             actuator: start.actuator,
@@ -120,6 +132,7 @@ impl Driver {
             known: None,
             prior: None,
             driven: 0.0,
+            turned: 0.0,
             caught: None,
             plan,
             governor: Governor::default(),
@@ -138,7 +151,7 @@ impl Driver {
         set.check()?;
         match set.trust {
             Trust::Provisional => self.prior = Some(set),
-            Trust::Assumed => (self.start, self.known) = (set, None),
+            Trust::Assumed => (self.start, self.known, self.turned) = (set, None, 0.0),
             Trust::Accepted | Trust::AcceptedWithin => {
                 // A peak that is known needs no memory of slides.
                 if set.trust == Trust::Accepted {
@@ -229,8 +242,8 @@ impl Driver {
         }
         if let Some(driven) = self.progress.pass(place, self.plan.grip) {
             self.driven = driven;
-            if let Some(caught) = self.caught {
-                self.caught = Some(caught * REGAINED);
+            self.caught = self.caught.map(|caught| caught * REGAINED);
+            if self.caught.is_some() || self.is_assumed() {
                 self.renew();
             }
         }
@@ -250,6 +263,7 @@ impl Driver {
             dt_s: self.asked.back().map_or(0.0, |a| from_s - a.from_s),
             wheelbase_m: self.vehicle.wheelbase_m(),
             l_f_m: self.vehicle.l_f_m,
+            assumed: self.is_assumed(),
         };
         let most = self.vehicle.max_steering_rad;
         let angle_rad = self.settings.pursuit.steering_rad(&moment, &mut self.trim_rad).clamp(-most, most);
@@ -285,20 +299,36 @@ impl Driver {
         let left = limits.left_beside(turned);
         let drive =
             limits.drive_at_mps2(state.v_x_mps) * left.max(LEAST_DRIVE) * if wide > 0.0 { 0.5 } else { 1.0 };
-        (speed_mps, wanted.clamp(-limits.brake_mps2 * left.max(0.15), drive))
+        // Whoever is too fast for a plan that was taken back has more to brake with than it says beside the turning.
+        let brake = limits.brake_mps2 * left.max(LEAST_BRAKE);
+        (speed_mps, wanted.clamp(-brake, drive))
     }
 
     fn watch(&mut self, state: &CarState) {
         let then_s = state.stamp_s - self.actuator.delay_s;
         let acting = self.asked.iter().rev().find(|a| a.from_s <= then_s + 1e-9);
-        let Some(acting) = acting.map(|a| (a.angle_rad, a.acceleration_mps2)) else { return };
+        let Some(acting) = acting.map(|a| a.angle_rad) else { return };
         if state.v_x_mps < 1.0 {
             self.governor.reset();
             return;
         }
-        if let Some(given) = self.governor.look(state, acting, &self.vehicle, &self.plan.tires) {
+        let assumed = self.is_assumed();
+        let Some(look) = self.governor.look(state, acting, &self.vehicle, &self.plan.tires, assumed) else {
+            return;
+        };
+        if let Some(given) = look.given {
             self.catch(CAUGHT * given);
+        } else if assumed {
+            self.turned = self.turned.max(look.turned);
+            if look.turned < GENTLE * self.plan.grip && self.allowed() > 1.02 * self.plan.grip {
+                self.renew();
+            }
         }
+    }
+
+    /// Whether nobody measured the tires planned with.
+    fn is_assumed(&self) -> bool {
+        self.start.trust == Trust::Assumed && self.known.is_none() && self.prior.is_none()
     }
 
     fn catch(&mut self, grip: f64) {
@@ -311,11 +341,13 @@ impl Driver {
         let Settings { share, step, prior_step, beyond, .. } = self.settings;
         let base = self.known.as_ref().unwrap_or(&self.start);
         let shown = base.grip();
-        let driven = self.driven.max(share * shown);
+        let careful = (ASSURED * self.turned).max(CAREFUL * share * shown).min(share * shown);
+        let driven = self.driven.max(if base.trust == Trust::Assumed { careful } else { share * shown });
+        let driven = driven.max(self.turned.min(share * self.start.grip()));
         let likely = base.likely_peak.unwrap_or(f64::INFINITY);
         let bold = (step * driven).min(beyond * shown);
         let alone = match base.trust {
-            Trust::Assumed => share * shown,
+            Trust::Assumed => careful.max(self.driven).min(share * shown),
             Trust::Accepted => bold.min(share * base.likely_peak.unwrap_or(shown)).max(share * shown),
             Trust::AcceptedWithin => bold.min(LIKELY * likely).max(share * shown),
             Trust::Provisional => share * shown,
@@ -324,9 +356,11 @@ impl Driver {
             _ if base.trust == Trust::Accepted => alone,
             // A prior below what was driven and a step is no reason to drive slower, unless nothing was shown.
             Some(prior) if base.trust == Trust::Assumed => (share * prior.grip()).min(prior_step * driven),
-            Some(prior) => {
-                (share * prior.grip()).min(likely).max(alone).min(prior_step * driven).min(beyond * shown)
-            }
+            Some(prior) => (share * prior.grip())
+                .min(LIKELY * likely)
+                .max(alone)
+                .min(prior_step * driven)
+                .min(beyond * shown),
             None => alone,
         };
         self.caught.map_or(grip, |caught| grip.min(caught))

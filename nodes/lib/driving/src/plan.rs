@@ -6,6 +6,9 @@ use crate::Track;
 use crate::profile::{Drivetrain, Limits, SpeedProfile};
 use crate::tires::{SteeringTable, with_peak};
 
+/// Share of the tires' peak that steering counts on however little is planned.
+const STEERS: f64 = 0.7;
+
 /// What is planned with.
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
@@ -26,7 +29,8 @@ impl Plan {
         grip: f64,
     ) -> Self {
         let peak = tires.front.d.min(tires.rear.d).max(grip);
-        let tires = if grip > 0.9 * peak { with_peak(tires, peak) } else { with_peak(tires, grip / 0.9) };
+        // A car that is faster than a plan that was taken back still needs all that its tires give.
+        let tires = with_peak(tires, peak.min((grip / 0.9).max(STEERS * peak)));
         let limits = Limits::new(vehicle, grip, drivetrain);
         Self {
             profile: SpeedProfile::new(track, &limits),

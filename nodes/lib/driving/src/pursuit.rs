@@ -6,7 +6,7 @@
 //! ```
 //!
 //! The second term damps: a steady-state table knows nothing of the yaw that is still to come. The third takes up what the tires do otherwise than the
-//! table says; it holds still near the limit, where more steering gives nothing.
+//! table says; it holds still near the limit, where more steering gives nothing, if the limit is known.
 
 use crate::state::CarState;
 use crate::{Place, SteeringTable, Track};
@@ -53,6 +53,8 @@ pub struct Moment<'a> {
     pub wheelbase_m: f64,
     /// Centre of gravity to front axle.
     pub l_f_m: f64,
+    /// Nobody measured the tires: the table's limit is not the car's.
+    pub assumed: bool,
 }
 
 impl Pursuit {
@@ -72,7 +74,7 @@ impl Pursuit {
         let late_radps = a / speed - car.yaw_rate_radps;
         let late_rad = at.wheelbase_m / speed.max(1.0) * late_radps;
         let grows = late_rad * *trim_rad > 0.0 && late_rad * a > 0.0;
-        if wanted.abs() < TRIM_UP_TO * most || !grows {
+        if at.assumed || wanted.abs() < TRIM_UP_TO * most || !grows {
             *trim_rad += at.dt_s.clamp(0.0, 0.05) / TRIM_S * (late_rad - 0.2 * *trim_rad);
         }
         let angle = at.table.steering_rad(a, speed) + YAW_GAIN * late_rad + *trim_rad;

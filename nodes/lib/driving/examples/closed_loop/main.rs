@@ -10,12 +10,14 @@ mod table;
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Result, ensure};
 use clap::Parser;
 use gripsight_reference_car::CarParameters;
 use rayon::prelude::*;
-use run::{Case, Run, Variant, drive};
+use run::{Case, Variant, drive};
+use table::Laps;
 
 /// Drives the reference car from mu = 0.51 on roads that it does not know, with and without identification.
 #[derive(Debug, Parser)]
@@ -24,7 +26,7 @@ use run::{Case, Run, Variant, drive};
     after_help = "Examples:\n  closed_loop out --quick\n  closed_loop out --cars f1tenth --tracks club,oval --frictions 0.6,0.9 --seeds 3\n  closed_loop out --quick --verbose"
 )]
 struct Arguments {
-    /// Folder for laps.csv and summary.md
+    /// Folder for laps.csv and summary.md; what laps.csv holds already is not driven again
     out: PathBuf,
     /// One track, one friction, the 1:10 car, two seeds
     #[arg(long)]
@@ -53,15 +55,6 @@ struct Arguments {
     /// Says on standard error what happens in each run; one after the other
     #[arg(long)]
     verbose: bool,
-}
-
-/// A run with what it was.
-#[derive(Debug, Clone)]
-pub(crate) struct Driven {
-    pub(crate) case: Case,
-    pub(crate) variant: Variant,
-    pub(crate) run: Run,
-    pub(crate) seconds: f64,
 }
 
 fn main() -> Result<()> {
@@ -98,27 +91,31 @@ fn main() -> Result<()> {
             }
         }
     }
-    let (count, done) = (work.len(), AtomicUsize::new(0));
-    let one = |(case, variant): (Case, Variant)| -> Result<Driven> {
+    std::fs::create_dir_all(&arguments.out)?;
+    let laps = Laps::open(&arguments.out.join("laps.csv"))?;
+    work.retain(|(case, variant)| !laps.rows.iter().any(|row| row.is_of(case, *variant)));
+    let (count, done, laps) = (work.len(), AtomicUsize::new(0), Mutex::new(laps));
+    let one = |(case, variant): (Case, Variant)| -> Result<()> {
         if arguments.verbose {
             eprintln!("{} {} {} seed {} {}", case.car.name, case.track, case.mu, case.seed, variant.name());
         }
         let begin = std::time::Instant::now();
         let run = drive(&case, variant, arguments.verbose)?;
+        let rows = table::rows(&case, variant, &run, begin.elapsed().as_secs_f64());
+        laps.lock().unwrap_or_else(PoisonError::into_inner).add(rows)?;
         let number = done.fetch_add(1, Ordering::Relaxed) + 1;
         if number.is_multiple_of(10) || number == count {
             eprintln!("{number} of {count} runs");
         }
-        Ok(Driven { case, variant, run, seconds: begin.elapsed().as_secs_f64() })
+        Ok(())
     };
-    let driven: Vec<Driven> = if arguments.verbose {
-        work.into_iter().map(one).collect::<Result<_>>()?
+    if arguments.verbose {
+        work.into_iter().try_for_each(one)?;
     } else {
-        work.into_par_iter().map(one).collect::<Result<_>>()?
-    };
-    std::fs::create_dir_all(&arguments.out)?;
-    std::fs::write(arguments.out.join("laps.csv"), table::laps_csv(&driven))?;
-    let summary = table::summary(&driven);
+        work.into_par_iter().try_for_each(one)?;
+    }
+    let laps = laps.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let summary = table::summary(&laps.rows);
     std::fs::write(arguments.out.join("summary.md"), &summary)?;
     print!("{summary}");
     Ok(())

@@ -1,47 +1,112 @@
-//! The tables of what was driven.
+//! The tables of what was driven: laps.csv, which grows run by run, and the summary of its rows.
 
 use std::fmt::Write as _;
+use std::fs::{File, OpenOptions};
+use std::io::Write as _;
+use std::path::Path;
 
-use crate::Driven;
-use crate::run::{Lap, Variant};
+use anyhow::{Context, Result};
+use serde::{Deserialize, Serialize};
+
+use crate::run::{Case, Lap, Run, Variant};
 
 /// Behind the true tires by no more than this: converged.
 const CONVERGED: f64 = 0.03;
 
-/// A row a lap.
-pub(crate) fn laps_csv(driven: &[Driven]) -> String {
-    let mut text = String::from(
-        "car,track,mu,seed,variant,lap,time_s,error_m,worst_m,used,exits,planned_grip,set,wreck,run_seconds\n",
-    );
-    for d in driven {
-        let case = &d.case;
-        let end = |lap: usize| if lap == d.run.laps.len() { d.run.wreck.unwrap_or("") } else { "" };
-        let mut row = |number: usize, lap: &Lap| {
-            let _ = writeln!(
-                text,
-                "{},{},{},{},{},{number},{:.3},{:.4},{:.4},{:.4},{},{:.4},{},{},{:.2}",
-                case.car.name,
-                case.track,
-                case.mu,
-                case.seed,
-                d.variant.name(),
-                lap.time_s,
-                lap.error_m,
-                lap.worst_m,
-                lap.used,
-                lap.exits,
-                lap.planned,
-                lap.trust.map_or(String::new(), |t| format!("{t:?}")),
-                end(number),
-                d.seconds,
-            );
-        };
-        d.run.laps.iter().enumerate().for_each(|(k, lap)| row(k + 1, lap));
-        if d.run.laps.is_empty() {
-            row(0, &Lap { time_s: f64::NAN, ..Lap::default() });
-        }
+/// A lap. A run without a whole lap has one row, lap 0.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Row {
+    pub(crate) car: String,
+    pub(crate) track: String,
+    pub(crate) mu: f64,
+    pub(crate) seed: u64,
+    pub(crate) variant: String,
+    lap: usize,
+    time_s: f64,
+    error_m: f64,
+    worst_m: f64,
+    used: f64,
+    exits: u32,
+    planned_grip: f64,
+    set: String,
+    wreck: String,
+    run_seconds: f64,
+}
+
+impl Row {
+    /// Whether it is of this run.
+    pub(crate) fn is_of(&self, case: &Case, variant: Variant) -> bool {
+        self.same_place(&case.car.name, &case.track, case.mu, case.seed) && self.variant == variant.name()
     }
-    text
+
+    fn same_place(&self, car: &str, track: &str, mu: f64, seed: u64) -> bool {
+        self.car == car && self.track == track && self.mu == mu && self.seed == seed
+    }
+}
+
+/// The rows of a run.
+pub(crate) fn rows(case: &Case, variant: Variant, run: &Run, seconds: f64) -> Vec<Row> {
+    let row = |number: usize, lap: &Lap| Row {
+        car: case.car.name.clone(),
+        track: case.track.clone(),
+        mu: case.mu,
+        seed: case.seed,
+        variant: variant.name().to_owned(),
+        lap: number,
+        time_s: thousandths(lap.time_s, 1e3),
+        error_m: thousandths(lap.error_m, 1e4),
+        worst_m: thousandths(lap.worst_m, 1e4),
+        used: thousandths(lap.used, 1e4),
+        exits: lap.exits,
+        planned_grip: thousandths(lap.planned, 1e4),
+        set: lap.trust.map_or(String::new(), |t| format!("{t:?}")),
+        wreck: if number == run.laps.len() { run.wreck.unwrap_or("").to_owned() } else { String::new() },
+        run_seconds: thousandths(seconds, 1e2),
+    };
+    if run.laps.is_empty() {
+        return vec![row(0, &Lap { time_s: f64::NAN, ..Lap::default() })];
+    }
+    run.laps.iter().enumerate().map(|(k, lap)| row(k + 1, lap)).collect()
+}
+
+/// To so many parts of one.
+fn thousandths(value: f64, parts: f64) -> f64 {
+    (value * parts).round() / parts
+}
+
+/// laps.csv: what it holds already counts as driven, and each run is added when it ends.
+pub(crate) struct Laps {
+    file: File,
+    pub(crate) rows: Vec<Row>,
+    empty: bool,
+}
+
+impl Laps {
+    pub(crate) fn open(path: &Path) -> Result<Self> {
+        let context = || format!("file {}", path.display());
+        let rows = if path.exists() {
+            csv::Reader::from_path(path)?
+                .deserialize()
+                .collect::<Result<Vec<Row>, _>>()
+                .with_context(context)?
+        } else {
+            Vec::new()
+        };
+        let file = OpenOptions::new().create(true).append(true).open(path).with_context(context)?;
+        Ok(Self { empty: file.metadata()?.len() == 0, file, rows })
+    }
+
+    pub(crate) fn add(&mut self, rows: Vec<Row>) -> Result<()> {
+        let mut writer = csv::WriterBuilder::new().has_headers(self.empty).from_writer(Vec::new());
+        for row in &rows {
+            writer.serialize(row)?;
+        }
+        // One write a run: what ends in the middle leaves no half of one.
+        self.file.write_all(&writer.into_inner()?)?;
+        self.empty = false;
+        self.rows.extend(rows);
+        Ok(())
+    }
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
@@ -59,61 +124,92 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
     if count > 0.0 { sum / count } else { f64::NAN }
 }
 
+/// The laps of one run.
+struct Driven<'a>(Vec<&'a Row>);
+
+impl Driven<'_> {
+    fn lap(&self, lap: usize) -> Option<&Row> {
+        self.0.iter().find(|r| r.lap == lap + 1).copied()
+    }
+}
+
+/// Runs of a car and a variant, in the order driven.
+fn runs<'a>(rows: &'a [Row], car: &str, variant: Variant) -> Vec<Driven<'a>> {
+    let mut runs: Vec<Driven<'a>> = Vec::new();
+    for row in rows.iter().filter(|r| r.car == car && r.variant == variant.name()) {
+        match runs.iter_mut().find(|d| d.0[0].same_place(&row.car, &row.track, row.mu, row.seed)) {
+            Some(run) => run.0.push(row),
+            None => runs.push(Driven(vec![row])),
+        }
+    }
+    runs
+}
+
 /// Lap times against the true tires' on the same track, road and seed, and how well the line was kept.
-pub(crate) fn summary(driven: &[Driven]) -> String {
-    let laps = driven.iter().map(|d| d.case.laps).max().unwrap_or(0);
+pub(crate) fn summary(rows: &[Row]) -> String {
+    let laps = rows.iter().map(|r| r.lap).max().unwrap_or(0);
     let mut text = String::new();
-    let mut cars: Vec<&str> = driven.iter().map(|d| d.case.car.name.as_str()).collect();
-    cars.dedup();
+    let mut cars: Vec<&str> = Vec::new();
+    for row in rows {
+        if !cars.contains(&row.car.as_str()) {
+            cars.push(&row.car);
+        }
+    }
     for car in cars {
-        let of =
-            |variant: Variant| driven.iter().filter(move |d| d.case.car.name == car && d.variant == variant);
-        let best = |d: &Driven, lap: usize| {
-            let same = |other: &&Driven| {
-                other.case.track == d.case.track
-                    && other.case.mu == d.case.mu
-                    && other.case.seed == d.case.seed
-            };
-            of(Variant::True).find(same).and_then(|t| t.run.laps.get(lap)).map_or(f64::NAN, |l| l.time_s)
+        let truth = runs(rows, car, Variant::True);
+        let best = |d: &Driven<'_>, lap: usize| {
+            let first = d.0[0];
+            let same = |t: &&Driven<'_>| t.0[0].same_place(&first.car, &first.track, first.mu, first.seed);
+            truth.iter().find(same).and_then(|t| t.lap(lap)).map_or(f64::NAN, |l| l.time_s)
         };
-        let _ = writeln!(text, "## {car}: {} runs a variant\n", of(Variant::True).count());
+        let _ = writeln!(text, "## {car}: {} runs a variant\n", truth.len());
         let heads: String = (1..=laps).map(|n| format!(" lap {n} |")).collect();
         let _ = writeln!(
             text,
-            "| variant |{heads} laps until within 3 % | error mean (m) | worst (m) | grip used, last lap | times off the track | wrecks |\n|---|{}---|---|---|---|---|---|",
+            "| variant |{heads} laps until within 3 % | error mean (m) | worst (m) | grip used, last lap | times off the track, first lap and later | wrecks |\n|---|{}---|---|---|---|---|---|",
             "---|".repeat(laps)
         );
-        for variant in Variant::ALL.into_iter().filter(|v| of(*v).next().is_some()) {
-            let behind = |d: &Driven, lap: usize| {
-                d.run.laps.get(lap).map_or(f64::NAN, |l| l.time_s / best(d, lap) - 1.0)
-            };
+        for variant in Variant::ALL {
+            let driven = runs(rows, car, variant);
+            if driven.is_empty() {
+                continue;
+            }
+            let behind =
+                |d: &Driven<'_>, lap: usize| d.lap(lap).map_or(f64::NAN, |l| l.time_s / best(d, lap) - 1.0);
             let cells: String = (0..laps)
                 .map(|lap| {
                     if variant == Variant::True {
-                        let times = of(variant).filter_map(|d| d.run.laps.get(lap)).map(|l| l.time_s);
-                        format!(" {:.2} s |", mean(times))
+                        format!(
+                            " {:.2} s |",
+                            mean(driven.iter().filter_map(|d| d.lap(lap)).map(|l| l.time_s))
+                        )
                     } else {
-                        format!(" {:+.1} % |", 100.0 * median(of(variant).map(|d| behind(d, lap)).collect()))
+                        format!(
+                            " {:+.1} % |",
+                            100.0 * median(driven.iter().map(|d| behind(d, lap)).collect())
+                        )
                     }
                 })
                 .collect();
-            let until = |d: &Driven| {
+            let until = |d: &Driven<'_>| {
                 (0..laps)
                     .find(|&lap| behind(d, lap) <= CONVERGED)
                     .map_or(laps as f64 + 1.0, |lap| lap as f64 + 1.0)
             };
-            let all = || of(variant).flat_map(|d| &d.run.laps);
-            let until = median(of(variant).map(until).collect());
+            let all = || driven.iter().flat_map(|d| d.0.iter().filter(|r| r.lap > 0));
+            let until = median(driven.iter().map(until).collect());
             let until = if until > laps as f64 { "never".to_owned() } else { format!("{until}") };
+            let exits = |first: bool| all().filter(|r| (r.lap == 1) == first).map(|r| r.exits).sum::<u32>();
             let _ = writeln!(
                 text,
-                "| {} |{cells} {until} | {:.3} | {:.3} | {:.1} % | {} | {} |",
+                "| {} |{cells} {until} | {:.3} | {:.3} | {:.1} % | {} + {} | {} |",
                 variant.name(),
                 mean(all().map(|l| l.error_m)),
                 all().map(|l| l.worst_m).fold(0.0, f64::max),
-                100.0 * mean(of(variant).filter_map(|d| d.run.laps.get(laps - 1)).map(|l| l.used)),
-                all().map(|l| l.exits).sum::<u32>(),
-                of(variant).filter(|d| d.run.wreck.is_some()).count(),
+                100.0 * mean(driven.iter().filter_map(|d| d.lap(laps - 1)).map(|l| l.used)),
+                exits(true),
+                exits(false),
+                driven.iter().filter(|d| d.0.iter().any(|r| !r.wreck.is_empty())).count(),
             );
         }
         text.push('\n');
