@@ -1,20 +1,16 @@
 #!/usr/bin/env python3
-"""Makes pairs of car and simulator, diagnoses them, and writes what was said beside what was true.
+"""Makes pairs of car and simulator from a table, diagnoses them, and writes what was said beside what was true.
 
-    diagnose_simulators.py GRIPSIGHT OUT [--table NAME] [--checkout PATH] [--seeds N] [--duration S]
-    diagnose_simulators.py GRIPSIGHT OUT --draw N --seed S [--without KIND ...] [--checkout PATH] [--duration S]
+    diagnose_simulators.py GRIPSIGHT OUT --table NAME [--checkout PATH] [--seeds N] [--duration S] [--smooth]
 
-The tables are below; --draw makes N pairs whose simulator, changes, track and noise are drawn, half of them unchanged. Labels are sealed: OUT/sealed.json
-is written first, with its SHA-256 in OUT/commitment.txt; the diagnosis sees each pair's bag and simulator alone. A pair that is done is
-not done again: the run can be stopped and resumed. Packages: see make_simulator_pairs.py.
+The tables are below. Pairs whose changes are drawn and sealed: `gripsight withheld make --simulators`. A pair that is done is not done again: the
+run can be stopped and resumed. Packages: see make_simulator_pairs.py.
 """
 
 import argparse
 import csv
-import hashlib
 import json
 import math
-import secrets
 import subprocess
 import sys
 import time
@@ -29,8 +25,7 @@ GROUPS = {
     "f1tenth_gym": [{"m", "I"}, {"steer_buffer_size", "delay_s"}],
     "slipx": [{"mass", "izz"}],
 }
-AROUND = {"delay_s": "steering_delay", "gain": "steering_gain", "offset_rad": "steering_offset", "lever_arm_m": "v_y_lever_arm",
-          "gyro_scale": "gyro_scale"}
+AROUND = {"delay_s": "steering_delay", "gain": "steering_gain", "offset_rad": "steering_offset", "x_m": "v_y_lever_arm", "scale": "gyro_scale"}
 TABLES = {
     "f1tenth_gym": [
         ("f1tenth_gym", {"steer_buffer_size": 8}), ("f1tenth_gym", {"C_Sf": 3.7744}), ("f1tenth_gym", {"m": 3.47}),
@@ -41,48 +36,12 @@ TABLES = {
         ("f1tenth_gym", {"gain": -0.5}), ("f1tenth_gym", {"gain": -0.5, "C_Sf": 3.7744}),
     ],
     "others": [
-        ("slipx", {"tyre_front.mu_y0": 0.9}), ("slipx", {"izz": 0.065}), ("slipx", {"lever_arm_m": -0.16}), ("slipx", {}),
+        ("slipx", {"tyre_front.mu_y0": 0.9}), ("slipx", {"izz": 0.065}), ("slipx", {"x_m": -0.16}), ("slipx", {}),
         ("commonroad_st", {"tire.p_ky1": -17.0}), ("commonroad_st", {"I_z": 2200.0}), ("commonroad_st", {"delay_s": 0.05}),
         ("commonroad_std", {"tire.p_dy1": 0.85}), ("simple_planning", {"steer_time_delay": 0.15}),
         ("simple_planning", {"steer_time_constant": 0.4}), ("simple_planning", {}),
     ],
 }
-# Changes that are drawn: least and largest share of the value, or sizes.
-DRAWN = {
-    "f1tenth_gym": {"C_Sf": (0.7, 0.9), "C_Sr": (0.75, 0.92), "I": (1.1, 1.4), "sv_max": (0.35, 0.6), "steer_buffer_size": (2.0, 4.5)},
-    "slipx": {"izz": (1.15, 1.5), "tyre_front.mu_y0": (0.7, 0.9), "tyre_rear.mu_y0": (1.08, 1.3), "lf": (0.85, 0.95), "c_alpha_f": (0.7, 0.9)},
-    "commonroad_st": {"tire.p_ky1": (0.7, 0.9), "I_z": (1.15, 1.5), "a": (0.88, 0.96)},
-    "commonroad_std": {"tire.p_dy1": (0.7, 0.9), "I_z": (1.15, 1.5), "tire.p_ky1": (0.7, 0.9)},
-    "commonroad_mb": {"tire.p_dy1": (0.7, 0.9), "tire.p_ky1": (0.7, 0.9), "m": (1.15, 1.4)},
-    "simple_planning": {"steer_time_delay": (0.4, 0.8), "steer_time_constant": (1.3, 1.8), "steer_rate_lim": (0.04, 0.08)},
-}
-DRAWN_AROUND = {"delay_s": (0.02, 0.08), "gain": (0.05, 0.15), "lever_arm_m": (0.03, 0.1), "gyro_scale": (0.03, 0.08), "offset_rad": (0.005, 0.02)}
-# A simulator, and a car that has what it has no term for.
-STRUCTURES = [("commonroad_st", "commonroad_std"), ("commonroad_std", "commonroad_mb"), ("simple_planning", "commonroad_st"),
-              ("slipx_bicycle", "slipx")]
-# Slow simulators get short drives.
-SHORT_S = {"commonroad_mb": 20.0}
-
-
-def drawn(count, seed, without):
-    """Half of the pairs are unchanged, a tenth lack a structure, the rest have one change or two."""
-    rng = np.random.default_rng(seed)
-    kinds = [kind for kind in DRAWN if kind not in without]
-    structures = [s for s in STRUCTURES if not set(s) & set(without)]
-    rows = []
-    for i in range(count):
-        kind = str(rng.choice(kinds))
-        car, changes = kind, {}
-        if i % 10 == 8:
-            kind, car = structures[rng.integers(len(structures))]
-        elif i % 2 == 0:
-            names = list(DRAWN[kind]) + [n for n in DRAWN_AROUND if kind != "simple_planning" or n in ("gyro_scale",)]
-            for name in rng.choice(names, size=1 if rng.random() < 0.7 else 2, replace=False):
-                changes[str(name)] = float(rng.uniform(*{**DRAWN[kind], **DRAWN_AROUND}[str(name)]))
-        # Shares become values where the pair is made.
-        rows.append((kind, car, changes, int(rng.integers(2**31))))
-    order = rng.permutation(count)
-    return [rows[i] for i in order]
 
 
 def truth_name(name):
@@ -96,22 +55,6 @@ def alike(kind, a, b):
     return a == b or any(a in g and b in g for g in group)
 
 
-def resolve(kind, changes, checkout):
-    """Shares of a value to values."""
-    sys.path[:0] = [str(MAKER.parent)]
-    import make_simulator_pairs as maker
-
-    values = {p["name"]: p for p in maker.build(kind, checkout)[0].parameters}
-    out = {}
-    for name, share in changes.items():
-        if name in values:
-            value = values[name]["value"] * share
-            out[name] = round(value) if values[name].get("integer") else value
-        else:
-            out[name] = share
-    return out
-
-
 def wilson(right, count):
     """A rate with its 90 % interval."""
     if not count:
@@ -122,28 +65,25 @@ def wilson(right, count):
     return f"{right} of {count} ({100 * p:.0f} %, {100 * low:.0f} to {100 * high:.0f})"
 
 
-def run(gripsight, folder, kind, car, changes, seed, arguments):
+def run(gripsight, folder, kind, changes, seed, arguments):
     """Makes and diagnoses one pair; the result as a row."""
     row = folder / "row.json"
     if row.exists():
         return json.loads(row.read_text())
     make = [sys.executable, str(MAKER), str(folder), kind, *(f"{k}={v}" for k, v in changes.items()), "--seed", str(seed),
-            "--duration", str(min(arguments.duration, SHORT_S.get(car, arguments.duration))),
-            "--checkout", str(Path(arguments.checkout).resolve()), "--car", car]
+            "--duration", str(arguments.duration), "--checkout", str(Path(arguments.checkout).resolve())]
     if arguments.smooth:
         make.append("--smooth")
-    subprocess.run(make, check=True)
+    made = json.loads(subprocess.run(make, check=True, stdout=subprocess.PIPE).stdout)
     file = folder / "simulator.yaml"
     file.write_text(file.read_text() + f"python: '{sys.executable}'\ntime_limit_s: 600\n")
-    truth = (folder / "truth.json").rename(folder.parent / f"{folder.name}.truth.json")
     start = time.time()
-    said = subprocess.run([gripsight, "diagnose", str(folder / "car.mcap"), "--simulator", str(file), "--out", str(folder / "result")],
+    said = subprocess.run([gripsight, "diagnose", str(folder / "bag.mcap"), "--simulator", str(file), "--out", str(folder / "result")],
                           capture_output=True, text=True)
     wall_s = time.time() - start
-    truth.rename(folder / "truth.json")
     if said.returncode not in (0, 3):
         print(said.stderr, file=sys.stderr)
-        return dict(simulator=kind, car=car, truth="; ".join(changes), seed=seed, verdict="error")
+        return dict(simulator=kind, truth="; ".join(changes), seed=seed, verdict="error")
     gap = json.loads((folder / "result/gap.json").read_text())
     named = [e for e in gap["effects"] if e["accepted"]]
     right, inside, errors = [], [], []
@@ -157,12 +97,12 @@ def run(gripsight, folder, kind, car, changes, seed, arguments):
             inside.append(p["low"] <= value <= p["high"])
             errors.append((p["value"] - value) / abs(value))
     out = dict(
-        simulator=kind, car=car, truth="; ".join(f"{k}={v:.4g}" for k, v in changes.items()) or ("unchanged" if car == kind else "structure"),
-        seed=seed, verdict=gap["verdict"], first_right=bool(named) and any(
+        simulator=kind, truth="; ".join(f"{k}={v:.4g}" for k, v in changes.items()) or "unchanged",
+        severity=min((c["severity"] for c in made["changes"].values()), default=math.nan), seed=seed, verdict=gap["verdict"], first_right=bool(named) and any(
             alike(kind, n, truth_name(t)) for t in changes for n in [named[0]["name"], *named[0]["confused_with"]]),
         named="; ".join(f"{e['name']}={next(iter(e['parameters'].values()))['value']:.4g}" for e in named),
         not_told_from="; ".join(n for e in named for n in e["confused_with"]),
-        all_right=all(right) if changes else gap["verdict"] == "missing_structure" if car != kind else not named, extra=max(0, len(named) - len(changes)), inside=f"{sum(inside)}/{len(inside)}",
+        all_right=all(right) if changes else not named, extra=max(0, len(named) - len(changes)), inside=f"{sum(inside)}/{len(inside)}",
         size_error=max((abs(e) for e in errors), default=math.nan), nominal=gap["gap"]["nominal"]["value"], after=gap["gap"]["after"]["value"],
         patched=gap["patch"]["verified"], rollouts=gap["simulator"]["rollouts"], candidates=gap["simulator"]["candidates"], wall_s=wall_s)
     row.write_text(json.dumps(out))
@@ -173,31 +113,17 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("gripsight")
     parser.add_argument("out", type=Path)
-    parser.add_argument("--table", choices=TABLES)
-    parser.add_argument("--draw", type=int)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--without", nargs="*", default=[], metavar="KIND", help="simulators that are not here")
+    parser.add_argument("--table", choices=TABLES, required=True)
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--duration", type=float, default=40.0)
     parser.add_argument("--checkout", default="f1tenth_gym")
     parser.add_argument("--smooth", action="store_true")
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
-    if arguments.draw is not None:
-        sealed = arguments.out / "sealed.json"
-        if not sealed.exists():
-            rows = [(k, car, resolve(k, c, arguments.checkout), s) for k, car, c, s in drawn(arguments.draw, arguments.seed, arguments.without)]
-            text = json.dumps(dict(nonce=secrets.token_hex(16), pairs=rows))
-            (arguments.out / "commitment.txt").write_text(hashlib.sha256(text.encode()).hexdigest() + "\n")
-            sealed.write_text(text)
-        text = sealed.read_text()
-        assert hashlib.sha256(text.encode()).hexdigest() == (arguments.out / "commitment.txt").read_text().strip(), "the seal is broken"
-        cases = [tuple(r) for r in json.loads(text)["pairs"]]
-    else:
-        cases = [(k, k, c, s) for k, c in TABLES[arguments.table] for s in range(1, arguments.seeds + 1)]
+    cases = [(k, c, s) for k, c in TABLES[arguments.table] for s in range(1, arguments.seeds + 1)]
     rows = []
-    for i, (kind, car, changes, seed) in enumerate(cases):
-        row = run(arguments.gripsight, arguments.out / f"pair_{i:03}", kind, car, changes, seed, arguments)
+    for i, (kind, changes, seed) in enumerate(cases):
+        row = run(arguments.gripsight, arguments.out / f"pair_{i:03}", kind, changes, seed, arguments)
         rows.append(row)
         print(*(f"{v:.3g}" if isinstance(v, float) else v for v in row.values()), sep=" | ", flush=True)
     keys = list(max(rows, key=len))
@@ -207,14 +133,13 @@ def main():
         writer.writerows(rows)
     done = [r for r in rows if r["verdict"] != "error"]
     of = lambda truth: [r for r in done if r["truth"] == truth]
-    changed = [r for r in done if r["truth"] not in ("unchanged", "structure")]
+    changed = [r for r in done if r["truth"] != "unchanged"]
     inside = [tuple(map(int, r["inside"].split("/"))) for r in changed]
     patched = sorted(r["patched"] for r in changed if r["patched"] is not None)
     print("errors:", len(rows) - len(done))
     print("first name right:", wilson(sum(r["first_right"] for r in changed), len(changed)))
     print("all changes right:", wilson(sum(r["all_right"] for r in changed), len(changed)))
     print("false alarms:", wilson(sum(not r["all_right"] for r in of("unchanged")), len(of("unchanged"))))
-    print("missing structure recognised:", wilson(sum(r["all_right"] for r in of("structure")), len(of("structure"))))
     print("90 % intervals hold:", wilson(sum(a for a, _ in inside), sum(b for _, b in inside)))
     print("patched, times the noise:", f"median {np.median(patched):.3g}, most {patched[-1]:.3g}, of {len(patched)}" if patched else "none")
 

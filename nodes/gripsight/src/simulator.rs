@@ -8,7 +8,7 @@ use anyhow::Context;
 use gripsight_bag::TopicMap;
 use gripsight_report::{PatchSaid, SimulatorInput, TopicUse, simulator_page, simulator_text, topic_uses};
 use gripsight_simulator::{
-    Commands, Question, Roll as _, Simulator, SimulatorDiagnosis, SimulatorFile, diagnose, held_out_error,
+    Commands, Question, Roll as _, Simulator, SimulatorDiagnosis, SimulatorFile, Span, diagnose, error_over,
     patch,
 };
 use indicatif::{ProgressBar, ProgressStyle};
@@ -31,10 +31,32 @@ struct GapFile<'a> {
 }
 
 #[derive(Serialize)]
-struct PatchFile<'a> {
+pub(crate) struct PatchFile<'a> {
     written: bool,
     verified: Option<f64>,
     by_hand: &'a [String],
+}
+
+impl<'a> PatchFile<'a> {
+    fn of(said: &'a PatchSaid) -> Self {
+        Self { written: !said.diff.is_empty(), verified: said.verified, by_hand: &said.by_hand }
+    }
+}
+
+/// What a drive that no fit has seen says: the error over the noise of the simulator as it came, and of the one with the effects named.
+#[derive(Serialize)]
+pub(crate) struct OtherDrive {
+    before: f64,
+    after: f64,
+}
+
+/// gap.json of a pair of the blind check.
+#[derive(Serialize)]
+pub(crate) struct PairFile<'a> {
+    #[serde(flatten)]
+    diagnosis: &'a SimulatorDiagnosis,
+    patch: PatchFile<'a>,
+    other_drive: OtherDrive,
 }
 
 /// Runs `diagnose` with a simulator.
@@ -59,7 +81,7 @@ pub(crate) fn run(args: &DiagnoseArgs, simulator_file: &Path) -> anyhow::Result<
     let result = diagnose(&simulator, &question, &mut progress)
         .with_context(|| format!("cannot diagnose {}", args.bag.display()))?;
     progress("the patched simulator");
-    let said = patched(&file, &simulator, &question, &result)?;
+    let (said, _) = patched(&file, &simulator, &question, &result)?;
     spinner.finish_and_clear();
     let diagnosing_s = start.elapsed().as_secs_f64() - reading_s;
     let notes = read_notes(&report);
@@ -72,7 +94,7 @@ pub(crate) fn run(args: &DiagnoseArgs, simulator_file: &Path) -> anyhow::Result<
     })?;
     let gap = GapFile {
         diagnosis: &result,
-        patch: PatchFile { written: !said.diff.is_empty(), verified: said.verified, by_hand: &said.by_hand },
+        patch: PatchFile::of(&said),
         topics: topic_uses(&report.topics),
         data_notes: &notes,
     };
@@ -95,17 +117,51 @@ pub(crate) fn run(args: &DiagnoseArgs, simulator_file: &Path) -> anyhow::Result<
     Ok(Outcome::Done)
 }
 
-/// The patch of the parameter file, and what the simulator that reads it says of held-out data. One that makes these worse is not given.
+/// Diagnoses a bag with a simulator, and says what another drive makes of it: a pair of the blind check, as its gap.json.
+pub(crate) fn pair(simulator_file: &Path, bag: &Path, other: &Path) -> anyhow::Result<String> {
+    let topics = TopicMap::default();
+    let file = SimulatorFile::read(simulator_file)?;
+    let [sequence, other] = [read(bag, &topics)?.0, read(other, &topics)?.0];
+    let question =
+        Question { file: &file, sequence: &sequence, commands: Commands::of(&sequence), without: &[] };
+    let simulator = Simulator::start(&file)?;
+    let result = diagnose(&simulator, &question, &mut |_| {})?;
+    let (said, patched) = patched(&file, &simulator, &question, &result)?;
+    let question = Question { sequence: &other, commands: Commands::of(&other), ..question };
+    let before = error_over(&simulator, &question, &[], Span::Whole)?;
+    let named: Vec<(String, f64)> = result
+        .fitted
+        .iter()
+        .filter(|(name, _)| result.effects.iter().any(|e| e.accepted && e.name == *name))
+        .cloned()
+        .collect();
+    let after = match patched {
+        _ if named.is_empty() => before,
+        Some(patched) => error_over(&patched, &question, &named, Span::Whole)?,
+        None => error_over(&simulator, &question, &named, Span::Whole)?,
+    };
+    let file = PairFile {
+        diagnosis: &result,
+        patch: PatchFile::of(&said),
+        other_drive: OtherDrive { before, after },
+    };
+    Ok(serde_json::to_string(&file)? + "\n")
+}
+
+/// The patch of the parameter file, what the simulator that reads it says of held-out data, and that simulator. One that makes these worse is
+/// not given.
 fn patched(
     file: &SimulatorFile,
     simulator: &Simulator,
     question: &Question<'_>,
     result: &SimulatorDiagnosis,
-) -> anyhow::Result<PatchSaid> {
+) -> anyhow::Result<(PatchSaid, Option<Simulator>)> {
     let found = patch(file, simulator.description(), &result.changes)?;
-    let Some(found) = found else { return Ok(PatchSaid::default()) };
+    let Some(found) = found else { return Ok((PatchSaid::default(), None)) };
     let mut said = PatchSaid { by_hand: found.by_hand.clone(), ..PatchSaid::default() };
-    let Some(path) = file.parameter_path().filter(|_| !found.changed.is_empty()) else { return Ok(said) };
+    let Some(path) = file.parameter_path().filter(|_| !found.changed.is_empty()) else {
+        return Ok((said, None));
+    };
     // Beside a copy of its neighbours: a parameter file may name others.
     let copy = tempfile::tempdir().context("cannot make a temporary folder")?;
     let parent = path.parent().unwrap_or(Path::new("."));
@@ -114,13 +170,14 @@ fn patched(
     fs::write(copy.path().join(name), &found.text).context("cannot write the patched parameters")?;
     let patched = Simulator::start_with(file, Some(&copy.path().join(name)))
         .context("cannot start the simulator with the patched parameters")?;
-    let error = held_out_error(&patched, question, &result.fitted)?;
+    let error = error_over(&patched, question, &result.fitted, Span::HeldOut)?;
     said.verified = Some(error);
     said.is_worse = error >= result.gap.nominal.value;
-    if !said.is_worse {
-        said.diff = found.diff;
+    if said.is_worse {
+        return Ok((said, None));
     }
-    Ok(said)
+    said.diff = found.diff;
+    Ok((said, Some(patched)))
 }
 
 /// Copies a folder's own files; large ones are no parameters.

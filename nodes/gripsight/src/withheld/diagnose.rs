@@ -6,13 +6,14 @@ use std::time::Instant;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use gripsight_withheld_make::{COMMITMENT, sha256_hex};
+use gripsight_withheld_make::{COMMITMENT, files, sha256_hex};
 use indicatif::{ParallelProgressIterator as _, ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::case::{Case, cases, gap_json, write_whole};
 use crate::Outcome;
+use crate::simulator::pair;
 
 /// Diagnose every case of a batch; reads DIR only.
 ///
@@ -107,11 +108,15 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
 
 fn one(folder: &Path, out: &Path) -> anyhow::Result<()> {
     fs::create_dir_all(out).with_context(|| format!("cannot make {}", out.display()))?;
-    let case = Case::read(folder)?;
+    let simulator = folder.join(files::SIMULATOR);
     let start = Instant::now();
-    let result = case.diagnose(&[]);
+    let gap = if simulator.exists() {
+        pair(&simulator, &folder.join(files::BAG), &folder.join(files::HELD_OUT))?
+    } else {
+        gap_json(&Case::read(folder)?.diagnose(&[]))? + "\n"
+    };
     let timing = Timing { diagnosing_s: start.elapsed().as_secs_f64() };
     write_whole(&out.join("timing.json"), &(serde_json::to_string(&timing)? + "\n"))?;
     // Last, for its being there says that the case is done.
-    write_whole(&out.join("gap.json"), &(gap_json(&result)? + "\n"))
+    write_whole(&out.join("gap.json"), &gap)
 }

@@ -6,7 +6,9 @@ use std::sync::Mutex;
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
-use gripsight_withheld_make::{Batch, BatchSettings, COMMITMENT, Journal, MeasuredDrives, Pool};
+use gripsight_withheld_make::{
+    Batch, BatchSettings, COMMITMENT, Journal, MeasuredDrives, Pool, SimulatorPairs,
+};
 use indicatif::{ParallelProgressIterator as _, ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
@@ -21,7 +23,7 @@ use crate::Outcome;
 pub(crate) struct MakeArgs {
     /// Cases of the reference car: a quarter without effect, a sixth each with an effect that the library lacks, with the true
     /// effect left out of the library and with two effects, the rest with one.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", required_unless_present = "simulators", default_value_t = 0)]
     cases: usize,
     /// Seed of the batch; without it, one from the system's random source, which the labels then hold.
     #[arg(long, value_name = "S")]
@@ -45,6 +47,16 @@ pub(crate) struct MakeArgs {
     /// Cases of them.
     #[arg(long, value_name = "N", requires = "recorded")]
     recorded_cases: Option<usize>,
+    /// Pairs of simulator and car: half unchanged, a tenth with a structure that the simulator lacks, a tenth with two changes, the
+    /// rest with one.
+    #[arg(long, value_name = "N", requires = "simulator_maker")]
+    simulators: Option<usize>,
+    /// What drives them: tests/plants/make_simulator_pairs.py.
+    #[arg(long, value_name = "FILE", requires = "simulators")]
+    simulator_maker: Option<PathBuf>,
+    /// The Python that has the simulators.
+    #[arg(long, value_name = "FILE", default_value = "python3", requires = "simulators")]
+    python: PathBuf,
     /// Where the cases go; made if it is not there.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -94,6 +106,7 @@ pub(crate) fn run(args: &MakeArgs) -> anyhow::Result<Outcome> {
         duration_s: args.duration,
         foreign: drives(args.foreign.as_ref(), args.foreign_cases),
         recorded: drives(args.recorded.as_ref(), args.recorded_cases),
+        simulators: pairs(args),
     })?;
     let batch = Batch::new(settings)?;
     let waiting: Vec<usize> = (0..batch.len())
@@ -123,6 +136,11 @@ pub(crate) fn run(args: &MakeArgs) -> anyhow::Result<Outcome> {
 
 fn drives(folder: Option<&PathBuf>, cases: Option<usize>) -> Option<MeasuredDrives> {
     Some(MeasuredDrives { folder: folder?.clone(), cases: cases? })
+}
+
+fn pairs(args: &MakeArgs) -> Option<SimulatorPairs> {
+    let maker = args.simulator_maker.clone()?;
+    Some(SimulatorPairs { maker, python: args.python.clone(), cases: args.simulators? })
 }
 
 fn same_folder(a: &std::path::Path, b: &std::path::Path) -> bool {

@@ -4,6 +4,7 @@ mod case;
 mod diagnose;
 mod make;
 mod score;
+mod simulator;
 
 use clap::{Args, Subcommand};
 
@@ -33,6 +34,8 @@ enum WithheldCommand {
     Make(make::MakeArgs),
     Diagnose(diagnose::DiagnoseArgs),
     Score(score::ScoreArgs),
+    #[command(hide = true)]
+    Simulator(simulator::SimulatorArgs),
 }
 
 /// Runs the subcommand.
@@ -41,5 +44,6 @@ pub(crate) fn run(args: &WithheldArgs) -> anyhow::Result<Outcome> {
         WithheldCommand::Make(args) => make::run(args),
         WithheldCommand::Diagnose(args) => diagnose::run(args),
         WithheldCommand::Score(args) => score::run(args),
+        WithheldCommand::Simulator(args) => simulator::run(args),
     }
 }

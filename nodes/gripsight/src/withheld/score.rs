@@ -11,7 +11,7 @@ use gripsight_report::{WithheldInput, withheld_page};
 use gripsight_signals::Measurement;
 use gripsight_withheld_make::{CaseLabel, Family, Kind, Labels, files};
 use gripsight_withheld_score::{
-    Answer, Control, Outside, Said, Scores, Targets, control, excuse_what_drives_have,
+    Answer, Control, Outside, PairScores, Said, Scores, Targets, control, excuse_what_drives_have,
 };
 use indicatif::{ParallelProgressIterator as _, ProgressBar, ProgressStyle};
 use rayon::prelude::*;
@@ -25,7 +25,8 @@ use crate::invocation::invocation;
 /// Open the labels of a batch and score the verdicts on it.
 ///
 /// The label file is checked against DIR/commitment.txt first. Each case that the targets speak of is then diagnosed once more with
-/// the names of its effects given (the oracle), unless --no-oracle. REPORT receives report.html, score.json, answers.jsonl and score.txt.
+/// the names of its effects given (the oracle), unless --no-oracle. REPORT receives report.html, score.json, answers.jsonl and score.txt; pairs.csv
+/// where the batch has pairs of simulator and car.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub(crate) struct ScoreArgs {
@@ -59,6 +60,8 @@ struct File<'a> {
     settings: &'a BTreeMap<String, serde_json::Value>,
     seed: u64,
     scores: &'a Scores,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pairs: Option<&'a PairScores>,
 }
 
 /// Runs the subcommand.
@@ -82,6 +85,8 @@ pub(crate) fn run(args: &ScoreArgs) -> anyhow::Result<Outcome> {
     if answers.len() < labels.cases.len() {
         tracing::warn!("{} of {} cases are diagnosed so far", answers.len(), labels.cases.len());
     }
+    let pairs: Vec<Answer> = answers.extract_if(.., |a| a.label.family == Family::Simulator).collect();
+    let pairs = (!pairs.is_empty()).then(|| PairScores::of(&pairs));
     excuse_what_drives_have(&mut answers);
     if !args.no_oracle {
         ask_oracle(&mut answers, &targets, args)?;
@@ -99,9 +104,10 @@ pub(crate) fn run(args: &ScoreArgs) -> anyhow::Result<Outcome> {
         settings: &labels.settings,
         seed: labels.seed,
         scores: &scores,
+        pairs: pairs.as_ref(),
     };
     let lines = answers.iter().map(|a| Ok(serde_json::to_string(a)? + "\n"));
-    let text = scores.text();
+    let text = scores.text() + &pairs.as_ref().map(PairScores::text).unwrap_or_default();
     let page = withheld_page(&WithheldInput {
         scores: &scores,
         batch: &args.dir.file_name().unwrap_or_default().to_string_lossy(),
@@ -115,6 +121,11 @@ pub(crate) fn run(args: &ScoreArgs) -> anyhow::Result<Outcome> {
     write_whole(&args.out.join("answers.jsonl"), &lines.collect::<anyhow::Result<String>>()?)?;
     write_whole(&args.out.join("score.json"), &(serde_json::to_string_pretty(&file)? + "\n"))?;
     write_whole(&args.out.join("score.txt"), &text)?;
+    if let Some(pairs) = &pairs {
+        let mut table = csv::Writer::from_writer(Vec::new());
+        pairs.rows.iter().try_for_each(|row| table.serialize(row))?;
+        write_whole(&args.out.join("pairs.csv"), &String::from_utf8(table.into_inner()?)?)?;
+    }
     print!("{text}");
     println!("files: {} (report.html, score.txt, score.json, answers.jsonl)", args.out.display());
     Ok(Outcome::Done)

@@ -201,6 +201,21 @@ impl Simulation {
         self.place = other.place;
     }
 
+    /// Puts the car into a motion where it is; actuators, springs and tires stay as they are, and wheels go on rolling with the slip they had.
+    pub fn put(&mut self, v_x_mps: f64, v_y_mps: f64, yaw_rate_radps: f64) {
+        let s = &mut self.state;
+        let faster = v_x_mps / s.v_x_mps;
+        if faster.is_finite() {
+            s.wheel_radps.iter_mut().for_each(|w| *w *= faster);
+        }
+        (s.v_x_mps, s.v_y_mps, s.yaw_rate_radps) = (v_x_mps, v_y_mps, yaw_rate_radps);
+    }
+
+    /// Forward speed, lateral speed and yaw rate now.
+    pub fn speeds(&self) -> [f64; 3] {
+        [self.state.v_x_mps, self.state.v_y_mps, self.state.yaw_rate_radps]
+    }
+
     /// Pushes the car: adds to its lateral speed and yaw rate at once.
     pub fn nudge(&mut self, v_y_mps: f64, yaw_rate_radps: f64) {
         self.state.v_y_mps += v_y_mps;

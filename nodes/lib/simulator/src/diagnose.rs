@@ -23,6 +23,9 @@ const MATTERS: f64 = 0.1;
 const SURE_Z: f64 = 2.0;
 /// A gap below this, times the noise, is none.
 const NO_GAP: f64 = 1.5;
+/// Where the best of the simulator's parameters leave more than this, times the noise, the simulator has no term for the rest: with the right
+/// terms a fit comes down to the noise.
+const UNEXPLAINED: f64 = 3.0;
 
 /// What is asked.
 #[derive(Debug)]
@@ -79,7 +82,9 @@ pub fn diagnose(
     let (nominal, left) = (error(&null), error(after));
     let free_closes = closed(after, &flexible.all);
     let z = scored.z(after, &flexible.all);
-    let is_missing = nominal.value > NO_GAP * floor && z > SURE_Z && free_closes.value > MATTERS;
+    let terms_help = z > SURE_Z && free_closes.value > MATTERS;
+    let unexplained = !found.fits.is_empty() && left.low > UNEXPLAINED * floor;
+    let is_missing = nominal.value > NO_GAP * floor && (terms_help || unexplained);
     let named_close = closed(&null, after);
     let verdict = match () {
         () if is_missing => Verdict::MissingStructure,
@@ -92,11 +97,14 @@ pub fn diagnose(
     let effects = effects(&list, &found, question.file, names_effects, &|k| {
         closed(if k == 0 { &null } else { &steps[k - 1] }, &steps[k])
     });
+    // A small part of the whole gap may be most of what parameters leave.
+    let of_what_is_left =
+        if unexplained { ((left.value - floor) / (nominal.value - floor)).min(1.0) } else { 1.0 };
     let mut missing: Vec<MissingTerm> = flexible
         .alone
         .iter()
         .map(|(name, m)| MissingTerm { name: (*name).to_owned(), closed_fraction: closed(after, m).value })
-        .filter(|m| is_missing && m.closed_fraction > 0.5 * MATTERS)
+        .filter(|m| is_missing && m.closed_fraction > 0.5 * MATTERS * of_what_is_left)
         .collect();
     missing.sort_by(|a, b| b.closed_fraction.total_cmp(&a.closed_fraction));
     let mut reasons = vec![Reason::Gap { nominal: nominal.value, after: left.value }];
@@ -150,14 +158,24 @@ pub fn diagnose(
     })
 }
 
-/// Error of a simulator over the noise on held-out windows, with effects around it at given sizes: what a patch is verified by.
+/// What of a drive an error is taken over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Span {
+    /// The blocks that no fit of this drive has seen.
+    HeldOut,
+    /// All of it: another drive than the one that was fitted.
+    Whole,
+}
+
+/// Error of a simulator over the noise, with effects around it at given sizes: what a patch is verified by.
 ///
 /// # Errors
 /// [`SimulatorError`].
-pub fn held_out_error(
+pub fn error_over(
     roll: &dyn Roll,
     question: &Question<'_>,
     around: &[(String, f64)],
+    span: Span,
 ) -> Result<f64, SimulatorError> {
     let description = roll.description();
     let imposed = description.imposes_v_x && question.file.v_x == ForwardSpeed::Auto;
@@ -169,7 +187,10 @@ pub fn held_out_error(
     let drive = Drive::new(question.sequence, question.commands.clone(), &wanted)?;
     let list = candidates(description, question.file, &drive.channels, imposed, question.without);
     let model = Model::new(roll, question.file, &drive, &list, imposed);
-    let fitter = Fitter::new(&model);
+    let mut fitter = Fitter::new(&model);
+    if span == Span::Whole {
+        fitter.layout.held_out.fill(true);
+    }
     let mut point = model.null();
     for (c, value) in list.iter().zip(&mut point.values) {
         let known = around.iter().find(|(name, _)| !c.is_own() && *name == c.name);

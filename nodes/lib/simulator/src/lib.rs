@@ -23,6 +23,7 @@ mod patch;
 mod plan;
 mod pool;
 mod search;
+mod server;
 #[cfg(test)]
 mod test_car;
 pub mod wire;
@@ -31,7 +32,7 @@ pub use adapters::Adapter;
 pub use candidates::{Candidate, Kind, Wrapped, candidates};
 pub use commands::{Command, CommandEffects, Commands};
 pub use description::{Channel, Description, Input, InputKind, SimulatorParameter};
-pub use diagnose::{Question, diagnose, held_out_error};
+pub use diagnose::{Question, Span, diagnose, error_over};
 pub use drive::{Drive, Stretch, WINDOW_S, Window};
 pub use error::SimulatorError;
 pub use export::{ExportError, Exported, Target, export};
@@ -43,3 +44,4 @@ pub use outcome::{
 };
 pub use patch::{Patch, patch};
 pub use pool::{Roll, Simulator};
+pub use server::{Stepped, serve};

@@ -15,6 +15,7 @@ use crate::draw::{self, Drive, Pool};
 use crate::label::{CaseLabel, Family, Kind, Labels, OracleFit, SealedEffect};
 use crate::measured::{self, MeasuredDrive, MeasuredDrives};
 use crate::oracle::oracle_fits;
+use crate::pairs::{self, SimulatorPairs};
 use crate::plan::{self, Planned};
 use crate::{WithheldError, drive, tires};
 
@@ -30,6 +31,8 @@ pub mod files {
     pub const TIRES: &str = "pacejka.yaml";
     /// Effects to leave out of the library, one a line.
     pub const WITHOUT: &str = "without.txt";
+    /// The simulator of a pair, in place of vehicle, tires and effects to leave out.
+    pub const SIMULATOR: &str = "simulator.yaml";
 }
 
 /// Drives tried until one comes to its end.
@@ -50,6 +53,9 @@ pub struct BatchSettings {
     pub foreign: Option<MeasuredDrives>,
     /// Recorded bags.
     pub recorded: Option<MeasuredDrives>,
+    /// Pairs of simulator and car.
+    #[serde(default)]
+    pub simulators: Option<SimulatorPairs>,
 }
 
 /// A batch as it is planned. Cases can be made in any order.
@@ -79,6 +85,9 @@ impl Batch {
         };
         let foreign = drives(&settings.foreign, Family::Foreign)?;
         let recorded = drives(&settings.recorded, Family::Recorded)?;
+        if let Some(asked) = &settings.simulators {
+            plan.extend(plan::pairs(asked.cases, pairs::COUNT, random));
+        }
         plan.shuffle(random);
         Ok(Self { settings, plan, foreign, recorded })
     }
@@ -136,6 +145,12 @@ impl Batch {
             Family::Reference => self.reference_case(case.clone(), planned, &part, &mut random),
             Family::Foreign => self.measured_case(case.clone(), planned, &self.foreign, &part, &mut random),
             Family::Recorded => self.measured_case(case.clone(), planned, &self.recorded, &part, &mut random),
+            Family::Simulator => match &self.settings.simulators {
+                Some(asked) => {
+                    pairs::pair(asked, case.clone(), planned, self.settings.duration_s, &part, &mut random)
+                }
+                None => Err(WithheldError::content(&part, &"a pair without simulators")),
+            },
         }?;
         let whole = folder.join(&case);
         if whole.exists() {

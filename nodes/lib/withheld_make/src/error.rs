@@ -61,6 +61,24 @@ pub enum WithheldError {
         /// What is missing.
         why: String,
     },
+    /// The maker of pairs of simulator and car failed.
+    #[error("{command} failed:\n{said}")]
+    Maker {
+        /// What was run.
+        command: String,
+        /// What it said.
+        said: String,
+    },
+    /// No change of a simulator shows in a drive.
+    #[error("none of {tries} draws of {simulator} shows at {severity} times the detection limit")]
+    NothingShows {
+        /// Which simulator.
+        simulator: String,
+        /// How many were tried.
+        tries: usize,
+        /// What was wanted.
+        severity: f64,
+    },
     /// Files of another batch are in the way.
     #[error("{path} belongs to a batch with other settings ({found}); finish that one, or name other files")]
     OtherBatch {

@@ -92,11 +92,13 @@ pub enum Family {
     Foreign,
     /// A recorded bag.
     Recorded,
+    /// A simulator and a car that is the same simulator with something changed; what differs from the simulator is asked.
+    Simulator,
 }
 
 impl Family {
     /// All families.
-    pub const ALL: [Self; 3] = [Self::Reference, Self::Foreign, Self::Recorded];
+    pub const ALL: [Self; 4] = [Self::Reference, Self::Foreign, Self::Recorded, Self::Simulator];
 
     /// As in the labels.
     #[must_use]
@@ -105,6 +107,7 @@ impl Family {
             Self::Reference => "reference",
             Self::Foreign => "foreign",
             Self::Recorded => "recorded",
+            Self::Simulator => "simulator",
         }
     }
 }

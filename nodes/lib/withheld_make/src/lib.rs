@@ -12,7 +12,9 @@ mod journal;
 mod label;
 mod measured;
 mod oracle;
+mod pairs;
 mod plan;
+pub mod reference_pairs;
 mod tires;
 
 pub use batch::{Batch, BatchSettings, files};
@@ -24,3 +26,4 @@ pub use label::{
 };
 pub use measured::MeasuredDrives;
 pub use oracle::{TIRE_TRUST, oracle_fits};
+pub use pairs::SimulatorPairs;

@@ -96,6 +96,117 @@ pub fn oracle_fits(
     Ok(fits(scenario, &reports, asked.len(), parts.len()))
 }
 
+/// Sizes of changes of a car over their detection limits, and their squared responses over the noise per residual, as v_y and yaw rate show
+/// them: `without` are the car with one of the changes left out. What start states or the other changes imitate does not count.
+///
+/// # Errors
+/// [`WithheldError::ReferenceCar`].
+pub(crate) fn change_severities(
+    car: &Scenario,
+    without: &[Scenario],
+) -> Result<Vec<(f64, f64)>, WithheldError> {
+    if without.is_empty() {
+        return Ok(Vec::new());
+    }
+    let exact = |s: &Scenario| Simulation::new(s.clone().sensors(SensorSettings::exact()));
+    let mut copies = vec![exact(car)?, exact(car)?, exact(car)?];
+    for other in without {
+        copies.push(exact(other)?);
+    }
+    let reports = drive_beside(exact(car)?, copies);
+    let samples = reports.iter().map(Vec::len).min().unwrap_or(0);
+    let [white, _] = noise(car, 0.0);
+    let mut information = DMatrix::zeros(without.len(), without.len());
+    let mut residuals = 0.0;
+    for w in 1..samples / WINDOW {
+        let window = SeenWindow::new(&reports, w, &white);
+        let columns: Vec<DVector<f64>> =
+            (4..reports.len()).map(|i| window.less_starts(&reports[0], &reports[i])).collect();
+        let columns = DMatrix::from_columns(&columns);
+        information += columns.tr_mul(&columns);
+        residuals += (SEEN * WINDOW) as f64;
+    }
+    for i in 0..without.len() {
+        information[(i, i)] += 1e-12;
+    }
+    let Some(inverse) = information.try_inverse() else { return Ok(vec![(0.0, 0.0); without.len()]) };
+    let of = |i: usize| {
+        let own = 1.0 / inverse[(i, i)];
+        (own.max(0.0).sqrt() / DETECTION, own / residuals)
+    };
+    Ok((0..without.len()).map(of).collect())
+}
+
+/// What no start and none of the `others` (the simulator with another parameter or an effect around it) imitates of a car that has what its
+/// simulator `given` lacks, as v_y and yaw rate show it: squared, over the noise, per residual.
+///
+/// # Errors
+/// [`WithheldError::ReferenceCar`].
+pub(crate) fn structure_excess(
+    car: &Scenario,
+    given: &Scenario,
+    others: &[Scenario],
+) -> Result<f64, WithheldError> {
+    let exact = |s: &Scenario| Simulation::new(s.clone().sensors(SensorSettings::exact()));
+    let mut copies = vec![exact(given)?, exact(given)?, exact(given)?];
+    for other in others {
+        copies.push(exact(other)?);
+    }
+    let reports = drive_beside(exact(car)?, copies);
+    let samples = reports.iter().map(Vec::len).min().unwrap_or(0);
+    let [white, _] = noise(car, 0.0);
+    let mut information = DMatrix::zeros(others.len(), others.len());
+    let (mut moment, mut whole, mut residuals) = (DVector::zeros(others.len()), 0.0, 0.0);
+    for w in 1..samples / WINDOW {
+        let window = SeenWindow::new(&reports, w, &white);
+        let wanted = window.less_starts(&reports[0], &reports[1]);
+        let columns: Vec<DVector<f64>> =
+            (4..reports.len()).map(|i| window.less_starts(&reports[i], &reports[1])).collect();
+        let columns = DMatrix::from_columns(&columns);
+        information += columns.tr_mul(&columns);
+        moment += columns.tr_mul(&wanted);
+        whole += wanted.norm_squared();
+        residuals += wanted.len() as f64;
+    }
+    // Figures may be alike in a drive.
+    for i in 0..others.len() {
+        information[(i, i)] *= 1.0 + 1e-6;
+        information[(i, i)] += 1e-9;
+    }
+    let size = information.cholesky().map(|c| c.solve(&moment));
+    let explained = size.map_or(0.0, |size| size.dot(&moment));
+    Ok(if residuals > 0.0 { (whole - explained).max(0.0) / residuals } else { 0.0 })
+}
+
+/// A window as v_y and yaw rate show it.
+struct SeenWindow<'a> {
+    span: std::ops::Range<usize>,
+    white: &'a [f64; CHANNELS],
+    starts: [DVector<f64>; 2],
+}
+
+/// Channels that a simulator is compared in: v_y and yaw rate.
+const SEEN: usize = 2;
+
+impl<'a> SeenWindow<'a> {
+    /// Of the reports of the car, then of its copies: as it is, started elsewhere twice, and others.
+    fn new(reports: &[Vec<Report>], number: usize, white: &'a [f64; CHANNELS]) -> Self {
+        let none = [DVector::zeros(0), DVector::zeros(0)];
+        let mut window = Self { span: number * WINDOW..(number + 1) * WINDOW, white, starts: none };
+        window.starts = orthonormal([2, 3].map(|i| window.column(&reports[i], &reports[1])));
+        window
+    }
+
+    fn column(&self, a: &[Report], b: &[Report]) -> DVector<f64> {
+        let (a, b) = (&a[self.span.clone()], &b[self.span.clone()]);
+        whitened(a, b, 1.0, self.white).rows(0, SEEN * WINDOW).clone_owned()
+    }
+
+    fn less_starts(&self, a: &[Report], b: &[Report]) -> DVector<f64> {
+        without_starts(self.column(a, b), &self.starts)
+    }
+}
+
 const TIRE_CHANGES: [fn(&mut CarParameters); TIRES] = [
     |car| raise(&mut car.tire_front, true),
     |car| raise(&mut car.tire_front, false),

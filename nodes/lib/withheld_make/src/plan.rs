@@ -51,6 +51,27 @@ pub(crate) fn measured(
     planned(family, &counts, cases, (&injectable(), &[]), sources, random)
 }
 
+/// Pairs of simulator and car: half unchanged, a tenth with a structure that the simulator lacks, a tenth with two changes, the rest
+/// with one; `simulators` in turn.
+pub(crate) fn pairs(cases: usize, simulators: usize, random: &mut ChaCha8Rng) -> Vec<Planned> {
+    let tenth = cases.div_ceil(10);
+    let counts = [
+        (Kind::None, cases.div_ceil(2)),
+        (Kind::OutOfLibrary, tenth),
+        (Kind::Pair, tenth),
+        (Kind::Single, cases),
+    ];
+    let mut out = Vec::with_capacity(cases);
+    for (kind, count) in counts {
+        for turn in 0..count.min(cases - out.len()) {
+            let source = turn % simulators.max(1);
+            out.push(Planned { family: Family::Simulator, kind, effects: Vec::new(), source });
+        }
+    }
+    out.shuffle(random);
+    out
+}
+
 fn planned(
     family: Family,
     counts: &[(Kind, usize)],
@@ -99,9 +120,18 @@ mod tests {
     }
 
     #[test]
+    fn half_of_the_pairs_are_unchanged_and_every_simulator_has_its_share() {
+        let plan = pairs(300, 6, &mut ChaCha8Rng::seed_from_u64(1));
+        let count = |kind| plan.iter().filter(|p| p.kind == kind).count();
+        assert_eq!(Kind::ALL.map(count), [150, 90, 30, 30, 0]);
+        assert!((0..6).all(|s| plan.iter().filter(|p| p.source == s).count() == 50));
+    }
+
+    #[test]
     fn small_batches_are_whole() {
         for cases in 0..20 {
             assert_eq!(reference(cases, &mut ChaCha8Rng::seed_from_u64(1)).len(), cases);
+            assert_eq!(pairs(cases, 6, &mut ChaCha8Rng::seed_from_u64(1)).len(), cases);
         }
     }
 }

@@ -20,6 +20,7 @@ fn settings(seed: u64) -> BatchSettings {
         duration_s: 10.0,
         foreign: None,
         recorded: None,
+        simulators: None,
     }
 }
 

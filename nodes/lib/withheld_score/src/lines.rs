@@ -129,7 +129,7 @@ pub(crate) fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
-fn at_least(what: &str, rate: Rate, least: f64) -> Line {
+pub(crate) fn at_least(what: &str, rate: Rate, least: f64) -> Line {
     let met = (rate.of > 0).then(|| rate.value() >= least);
     Line {
         what: what.to_owned(),
@@ -140,7 +140,7 @@ fn at_least(what: &str, rate: Rate, least: f64) -> Line {
     }
 }
 
-fn at_most(what: &str, rate: Rate, most: f64) -> Line {
+pub(crate) fn at_most(what: &str, rate: Rate, most: f64) -> Line {
     let met = (rate.of > 0).then(|| rate.value() <= most);
     Line {
         what: what.to_owned(),
@@ -151,7 +151,7 @@ fn at_most(what: &str, rate: Rate, most: f64) -> Line {
     }
 }
 
-fn figure(what: &str, wanted: String, value: f64, met: bool) -> Line {
+pub(crate) fn figure(what: &str, wanted: String, value: f64, met: bool) -> Line {
     let met = value.is_finite().then_some(met);
     Line { what: what.to_owned(), wanted, rate: None, value: finite(value), met }
 }

@@ -2,7 +2,22 @@
 
 use std::fmt::Write as _;
 
-use crate::{Line, Rate, Scores};
+use crate::{Line, PairScores, Rate, Scores};
+
+impl PairScores {
+    /// Targets beside what was reached, and right answers by simulator.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut text = format!("simulator and car: {} pairs\n", self.pairs);
+        for line in &self.lines {
+            let _ = writeln!(text, "  {:<46} {:<30} {}", line.what, reached(line), line.verdict());
+        }
+        for (simulator, rate) in &self.by_simulator {
+            let _ = writeln!(text, "  right, {simulator}: {}", short(rate));
+        }
+        text
+    }
+}
 
 impl Scores {
     /// Targets beside what was reached, by family; the control; baselines.

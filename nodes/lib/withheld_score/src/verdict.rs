@@ -55,6 +55,22 @@ pub struct SaidGap {
     pub noise_floor: Figure,
 }
 
+/// Errors over the noise on a drive that no fit has seen: of a simulator as it came, and with what was named.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct OtherDrive {
+    /// As it came.
+    pub before: Option<f64>,
+    /// With what was named.
+    pub after: Option<f64>,
+}
+
+/// What became of a simulator's parameter file.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SaidPatch {
+    /// Whether a patch was given.
+    pub written: bool,
+}
+
 /// A verdict.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Said {
@@ -66,6 +82,12 @@ pub struct Said {
     /// The gap.
     #[serde(default)]
     pub gap: SaidGap,
+    /// Only of pairs of simulator and car.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub other_drive: Option<OtherDrive>,
+    /// Only of pairs of simulator and car.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub patch: Option<SaidPatch>,
 }
 
 impl Said {
@@ -74,9 +96,9 @@ impl Said {
         self.accepted().map(|e| e.name.as_str())
     }
 
-    /// Effects that the verdict names.
+    /// Effects that the verdict names; beside structure that a simulator lacks some may be.
     pub fn accepted(&self) -> impl Iterator<Item = &SaidEffect> {
-        let naming = self.verdict == "effects";
+        let naming = ["effects", "missing_structure"].contains(&self.verdict.as_str());
         self.effects.iter().filter(move |e| naming && e.accepted)
     }
 

@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 
 use gripsight_withheld_make::{CaseLabel, Family, Kind, OracleFit, SealedEffect};
 use gripsight_withheld_score::{
-    Answer, Figure, Line, Said, SaidEffect, SaidGap, SaidParameter, Scores, Targets, excuse_what_drives_have,
+    Answer, Figure, Line, OtherDrive, PairScores, Said, SaidEffect, SaidGap, SaidParameter, SaidPatch,
+    Scores, Targets, excuse_what_drives_have,
 };
 
 fn effect(name: &str, severity: f64, excess: f64) -> SealedEffect {
@@ -54,7 +55,7 @@ fn answer(kind: Kind, effects: Vec<SealedEffect>, verdict: &str, said: Vec<SaidE
         contained: Vec::new(),
         circumstances: BTreeMap::new(),
     };
-    let said = Said { verdict: verdict.to_owned(), effects: said, gap };
+    let said = Said { verdict: verdict.to_owned(), effects: said, gap, other_drive: None, patch: None };
     Answer { label, said, oracle: None, baselines: BTreeMap::new(), time_s: 1.0 }
 }
 
@@ -137,4 +138,43 @@ fn what_a_recorded_drive_has_is_excused() {
     assert!(!answers[1].exact());
     excuse_what_drives_have(&mut answers);
     assert!(!answers[0].false_alarm() && answers[1].exact() && !answers[2].exact());
+}
+
+#[test]
+fn pairs_are_scored_by_what_was_changed_and_by_another_drive() {
+    let pair = |kind, effects, verdict: &str, said, after| {
+        let mut answer = answer(kind, effects, verdict, said);
+        answer.label.family = Family::Simulator;
+        answer.label.circumstances.insert("simulator".to_owned(), "slipx".into());
+        answer.said.other_drive = Some(OtherDrive { before: Some(8.0), after: Some(after) });
+        answer.said.patch = Some(SaidPatch { written: kind == Kind::Single });
+        answer
+    };
+    let change = |name| vec![effect(name, 3.0, 0.0)];
+    let answers = [
+        // Named as what it is; by its group; not at all; one of two; and one name too many, with a patch that harms.
+        pair(Kind::Single, change("a"), "effects", vec![named("a", 0.9, &[])], 1.1),
+        pair(Kind::Single, change("a"), "effects", vec![named("b", 0.5, &["a"])], 1.2),
+        pair(Kind::Single, change("a"), "no_gap", Vec::new(), 8.0),
+        pair(Kind::Pair, [change("a"), change("c")].concat(), "effects", vec![named("c", 0.9, &[])], 4.0),
+        pair(Kind::Single, change("a"), "effects", vec![named("a", 0.9, &[]), named("d", 0.9, &[])], 9.0),
+        pair(Kind::OutOfLibrary, Vec::new(), "missing_structure", vec![named("a", 0.9, &[])], 5.0),
+        pair(Kind::OutOfLibrary, Vec::new(), "effects", vec![named("a", 0.9, &[])], 5.0),
+        pair(Kind::None, Vec::new(), "no_gap", Vec::new(), 1.0),
+        pair(Kind::None, Vec::new(), "missing_structure", Vec::new(), 1.0),
+    ];
+    let scores = PairScores::of(&answers);
+    let line = |start: &str| -> &Line { scores.lines.iter().find(|l| l.what.starts_with(start)).unwrap() };
+    let rate = |start: &str| line(start).rate.map(|r| (r.hits, r.of)).unwrap();
+    assert_eq!(rate("one change: first name right"), (3, 4));
+    assert_eq!(rate("changes named"), (4, 6));
+    assert_eq!(rate("something named beside"), (1, 5));
+    // The mechanism's constant is 1, the interval goes from 1 on.
+    assert_eq!(rate("90 % intervals"), (3, 3));
+    assert_eq!(rate("missing structure"), (1, 2));
+    assert_eq!(rate("false alarms"), (1, 2));
+    assert_eq!(rate("patches that help"), (2, 4));
+    assert_eq!(line("error left on another drive").value, Some(4.0));
+    assert_eq!(scores.rows.len(), 9);
+    assert!(scores.text().contains("right, slipx: 4/9"));
 }

@@ -16,6 +16,7 @@ pub(super) fn family(family: Family) -> &'static str {
         Family::Reference => "reference car",
         Family::Foreign => "plants that others wrote",
         Family::Recorded => "recorded bags with injected effects",
+        Family::Simulator => "pairs of simulator and car",
     }
 }
 
