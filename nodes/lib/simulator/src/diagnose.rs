@@ -89,7 +89,8 @@ pub fn diagnose(
     let verdict = match () {
         () if is_missing => Verdict::MissingStructure,
         () if !found.fits.is_empty() => Verdict::Effects,
-        () if nominal.low > NO_GAP * floor => Verdict::NoneOfThese,
+        // A few blocks may hold all of it: its lower end says nothing then.
+        () if nominal.value > NO_GAP * floor => Verdict::NoneOfThese,
         () => Verdict::NoGap,
     };
     // Beside missing structure a parameter may stand in for it: it is named where it closes more than the free terms do.
@@ -323,3 +324,6 @@ fn invisible(roll: &dyn Roll, list: &[Candidate], drive: &Drive, imposed: bool) 
     }
     out
 }
+
+#[cfg(test)]
+mod tests;

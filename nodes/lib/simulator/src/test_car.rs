@@ -18,6 +18,8 @@ pub(crate) struct TestCar {
     passes: AtomicUsize,
     /// Relaxation length of the tires: something the simulator has no parameter for.
     pub(crate) relaxation_m: f64,
+    /// What the car makes of a commanded angle.
+    pub(crate) steering_gain: f64,
 }
 
 impl TestCar {
@@ -50,7 +52,7 @@ impl TestCar {
             imposes_v_x: true,
             lacks: vec!["tire relaxation".to_owned()],
         };
-        Self { description, passes: AtomicUsize::new(0), relaxation_m: 0.0 }
+        Self { description, passes: AtomicUsize::new(0), relaxation_m: 0.0, steering_gain: 1.0 }
     }
 
     fn pass(&self, batch: &Batch, b: usize) -> Vec<[f64; 3]> {
@@ -111,7 +113,9 @@ impl TestCar {
         let time = |k: usize| 0.01 * k as f64;
         let batch = Batch {
             parameters: Array2::from_shape_vec((1, p.len()), p).unwrap(),
-            commands: Array3::from_shape_fn((1, samples, 1), |(_, k, _)| steering(time(k))),
+            commands: Array3::from_shape_fn((1, samples, 1), |(_, k, _)| {
+                self.steering_gain * steering(time(k))
+            }),
             place_steps: Array1::from_vec(vec![0]),
             motions: Array3::from_shape_fn((1, 1, 3), |(_, _, s)| [speed(0.0), 0.0, 0.0][s]),
             v_x_mps: Some(Array2::from_shape_fn((1, samples + 1), |(_, k)| speed(time(k)))),
