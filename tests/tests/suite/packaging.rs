@@ -28,3 +28,21 @@ fn every_package_installs_the_manifest_that_it_inherits_from_and_is_built_for_re
         assert_eq!(colcon["cargo-args"], serde_json::json!(["--release"]));
     }
 }
+
+/// A node that colcon builds alone carries its own page, not the blind check's with the plant behind it.
+#[test]
+fn the_diagnosis_on_the_car_links_no_plant() {
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let tree = ["tree", "--package", "gripsight_gap_diagnosis", "--edges", "normal", "--prefix", "none"];
+    let cargo = std::process::Command::new(env!("CARGO"))
+        .args(tree)
+        .args(["--locked", "--offline"])
+        .current_dir(workspace)
+        .output()
+        .unwrap();
+    let linked = String::from_utf8(cargo.stdout).unwrap();
+    assert!(linked.contains("gripsight_report"), "{}", String::from_utf8_lossy(&cargo.stderr));
+    for not in ["gripsight_reference_car", "gripsight_withheld", "gripsight_simulator"] {
+        assert!(!linked.contains(not), "{linked}");
+    }
+}

@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use gripsight_identification::{Outcome, Range};
-use gripsight_report::text::{estimate, interval, peak_friction, significant, status, with_interval};
+use gripsight_report::text::{interval, significant, with_interval};
+use gripsight_report::{estimate, peak_friction, status};
 
 use super::progress::Timing;
 

@@ -7,9 +7,10 @@ use gripsight_model::{BASE, EffectId, ExtendedModel, Site};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use crate::columns::Columns;
 use crate::engine::Engine;
 use crate::infer::FIRST;
-use crate::joint::{Columns, Joint};
+use crate::joint::Joint;
 
 /// Iterations of the fit between two linearisations.
 const ITERATIONS: usize = 4;

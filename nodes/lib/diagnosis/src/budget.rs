@@ -3,7 +3,7 @@
 use gripsight_estimation::{
     Estimate, HORIZON_S, Split, Windows, bootstrap, by_block, interval, mean, of_length, of_picked, split,
 };
-use gripsight_model::{EffectId, ExtendedModel, Flexible, Recording, Room};
+use gripsight_model::{EffectId, ExtendedModel, Flexible, Recording, Site};
 use std::collections::BTreeMap;
 
 use crate::engine::Engine;
@@ -119,7 +119,7 @@ impl Budget {
             })
             .collect();
         let slip = large_slip_rad(engine, null, &windows.training);
-        let flexible = Flexible::new(engine.recording, slip, engine.vehicle.wheelbase_m(), &Room::ALL);
+        let flexible = Flexible::new(engine.recording, slip, engine.vehicle.wheelbase_m(), &Site::ALL);
         let (ceiling, residual) = rayon::join(
             || engine.fit_flexible(state, &flexible, &windows.training),
             || Residual::learned(engine, null, &windows.training),

@@ -16,7 +16,8 @@ use crate::decisions;
 use crate::engine::Engine;
 
 use crate::answer::Change;
-use crate::infer::{FIRST, Inferred};
+use crate::infer::FIRST;
+use crate::inferred::Inferred;
 use crate::outcome::EffectParameter;
 use crate::trust::TireTrust;
 

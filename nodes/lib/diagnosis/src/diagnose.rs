@@ -9,7 +9,8 @@ use crate::budget::{Budget, CANDIDATES, Models, Scorer, large_slip_rad};
 use crate::engine::Engine;
 use crate::figures::figures;
 use crate::finding::{detection_limits, ranked, sites};
-use crate::infer::{Inferred, infer};
+use crate::infer::infer;
+use crate::inferred::Inferred;
 use crate::outcome::{Diagnosis, Inference, Invisible, TirePair};
 use crate::posterior::{is_of, trust, usual};
 use crate::state::State;
@@ -142,7 +143,7 @@ pub(crate) fn explain(
         None => {
             let slip_rad = large_slip_rad(&engine, &first, &search_windows);
             let wheelbase_m = request.vehicle.wheelbase_m();
-            let flexible = Flexible::by_site(&recording, slip_rad, wheelbase_m, &Site::ALL);
+            let flexible = Flexible::new(&recording, slip_rad, wheelbase_m, &Site::ALL);
             let scorer = Scorer::new(&engine.clone(), other.as_ref(), &windows);
             let found = infer(&mut engine, &first, &library, flexible, &search_windows, &scorer, progress);
             (found.ok_or(GapError::NotFinite)?, None)

@@ -4,7 +4,7 @@ use gripsight_model::EffectId;
 use serde::Serialize;
 
 use crate::engine::Engine;
-use crate::infer::Inferred;
+use crate::inferred::Inferred;
 use crate::sizes::with_half_widths;
 
 /// Half widths of its interval by which a figure that is fitted along misses what is stated to be contradicted: the prior holds it back, so that

@@ -11,7 +11,7 @@ use crate::answer::{MechanismAnswer, SiteAnswer};
 use crate::budget::Budget;
 use crate::decisions;
 use crate::engine::Engine;
-use crate::infer::Inferred;
+use crate::inferred::Inferred;
 use crate::outcome::{DetectionLimit, RankedEffect};
 use crate::sizes::{reported, with_half_widths};
 

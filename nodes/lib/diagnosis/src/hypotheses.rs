@@ -3,9 +3,9 @@
 use gripsight_estimation::selection::{ColumnPrior, Term};
 use gripsight_model::{EffectId, HOLD, Site, TIRES, tires_to_parameters};
 
+use crate::columns::Columns;
 use crate::decisions;
 use crate::engine::Engine;
-use crate::joint::Columns;
 use crate::priors::TIRE_BOUNDS;
 
 /// The terms with their priors around the present values.

@@ -3,8 +3,9 @@
 use gripsight_model::Rollout;
 use rayon::prelude::*;
 
+use crate::columns::Columns;
 use crate::engine::Engine;
-use crate::joint::{Columns, Joint};
+use crate::joint::Joint;
 use gripsight_estimation::Windows;
 use gripsight_model::EffectId;
 use gripsight_model::Site;

@@ -8,11 +8,12 @@ use gripsight_vehicle::{PacejkaParameters, PosteriorParameter, TirePosterior, Ve
 
 use crate::around::Around;
 use crate::budget::large_slip_rad;
+use crate::columns::Columns;
 use crate::diagnose::{SEARCH_WINDOWS, fit_tires, fitted_null};
 use crate::engine::{Engine, Sized};
 use crate::hypotheses::terms;
 use crate::infer::{noise_scale, repeated};
-use crate::joint::{Columns, Joint};
+use crate::joint::Joint;
 use crate::sizes::own_covariance;
 use crate::trust::TireTrust;
 use crate::usable::{Usable, usable};
@@ -42,7 +43,7 @@ pub fn own_tires(
     let windows = split(&recording, false).training.thinned(SEARCH_WINDOWS);
     let null = fitted_null(&engine, &windows)?;
     let slip_rad = large_slip_rad(&engine, &null, &windows);
-    let flexible = Flexible::by_site(&recording, slip_rad, vehicle.wheelbase_m(), &Site::ALL);
+    let flexible = Flexible::new(&recording, slip_rad, vehicle.wheelbase_m(), &Site::ALL);
     let columns = Columns::new(EffectId::background().collect(), flexible);
     let mut values = columns.blank(&engine);
     values[..BASE].copy_from_slice(&null.parameters[..BASE]);

@@ -8,11 +8,12 @@ use gripsight_model::EffectId;
 use nalgebra::{DMatrix, DVector};
 
 use crate::around::{Around, Refined};
+use crate::columns::Columns;
 use crate::decisions;
 use crate::engine::Engine;
 use crate::hypotheses::terms;
 use crate::infer::FIRST;
-use crate::joint::{Columns, Joint, Weighed};
+use crate::joint::{Joint, Weighed};
 use crate::outcome::EffectParameter;
 
 /// Half width of a 90 % interval in standard deviations.

@@ -6,7 +6,7 @@ use gripsight_model::{EffectId, Need, Site};
 use crate::budget::Budget;
 use crate::decisions;
 use crate::finding::untried;
-use crate::infer::Inferred;
+use crate::inferred::Inferred;
 use crate::outcome::{Invisible, RankedEffect, Verdict};
 
 /// Held-out error of the retuned over that of the nominal model from which it is worth a word.

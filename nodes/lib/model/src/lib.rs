@@ -61,7 +61,7 @@ pub use effects::{
     Effect, EffectId, EffectSpec, Figure, Lagging, Need, ParameterSpec, Reported, Unknown, Usual, Wheels,
 };
 pub use error::ModelError;
-pub use flexible::{Flexible, Group, Room};
+pub use flexible::{Flexible, Group};
 pub use identities::{HEADING, Identity, LATERAL};
 pub use model::{BASE, ExtendedModel, HOLD, TIRES, tires_from_parameters, tires_to_parameters};
 pub use recording::{Channel, NEEDED_S, Recording, Run, WINDOW_S};

@@ -1,7 +1,5 @@
 //! Numbers as people read them, on pages and on the terminal.
 
-use gripsight_identification::{Estimate, Outcome, PeakFriction, Status};
-
 /// A dash where there is nothing to say.
 const NOTHING: &str = "–";
 
@@ -54,40 +52,11 @@ pub fn with_interval(value: f64, low: f64, high: f64) -> (String, String) {
     (fixed(value, interval_decimals(low, high)), interval(low, high))
 }
 
-/// An estimate with its interval behind it.
-#[must_use]
-pub fn estimate(e: &Estimate) -> String {
-    estimate_of(e.value, e.low, e.high)
-}
-
 /// A value with its interval behind it, where it has one.
 #[must_use]
 pub fn estimate_of(value: f64, low: f64, high: f64) -> String {
     let (text, range) = with_interval(value, low, high);
     if low == high { text } else { format!("{text} ({range})") }
-}
-
-/// What a set may be used for.
-#[must_use]
-pub fn status(outcome: &Outcome) -> &'static str {
-    match outcome.status {
-        Status::Accepted => "accepted",
-        Status::AcceptedWithin => "accepted within what was driven",
-        Status::Provisional => "provisional: the peak rests on a prior",
-        Status::Rejected => "not accepted",
-    }
-}
-
-/// Peak friction with its interval, or what stands in its place.
-#[must_use]
-pub fn peak_friction(peak: &PeakFriction) -> String {
-    if peak.reached {
-        estimate(&Estimate { value: peak.value, low: peak.low, high: peak.high })
-    } else if peak.from_prior {
-        format!("{} from the prior", fixed(peak.value, 2))
-    } else {
-        "not reached".to_owned()
-    }
 }
 
 /// Two digits of the interval's width, but no more than four of the numbers.

@@ -15,7 +15,6 @@
 //! | road_and_wind | pull by the place on the lap, force and moment by the heading |
 
 mod blocks;
-mod rooms;
 mod series;
 #[cfg(test)]
 mod tests;
@@ -26,8 +25,7 @@ use crate::recording::{Recording, Run};
 use crate::site::Site;
 use crate::terms::{Moment, Outputs, delayed};
 use blocks::{Block, DRIVE_LAGS_S, HARMONICS, SENSED, SENSOR_LAGS_S, STEERING_LAGS_S};
-pub use rooms::Room;
-use series::{before, harmonics, increments, rms, slope, weighted};
+use series::{harmonics, increments, rms, slope, weighted};
 
 /// The terms of one site.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -74,29 +72,16 @@ pub struct Flexible {
 }
 
 impl Flexible {
-    /// The terms of some rooms. Scales are taken from a recording; `slip_rad` is a large slip angle of the fitted model on it.
-    #[must_use]
-    pub fn new(recording: &Recording, slip_rad: f64, wheelbase_m: f64, rooms: &[Room]) -> Self {
-        let blocks = rooms.iter().flat_map(|room| room.blocks()).copied().collect();
-        Self::of_blocks(recording, slip_rad, wheelbase_m, blocks)
-    }
-
     /// The terms of some sites, in that order. Scales are taken from a recording; `slip_rad` is a large slip angle of the fitted model on it.
     #[must_use]
-    pub fn by_site(recording: &Recording, slip_rad: f64, wheelbase_m: f64, sites: &[Site]) -> Self {
-        let blocks = sites.iter().flat_map(|site| blocks::of_site(*site)).copied().collect();
-        let groups = sites.iter().copied().map(Group::of).collect();
-        Self { groups, ..Self::of_blocks(recording, slip_rad, wheelbase_m, blocks) }
-    }
-
-    fn of_blocks(recording: &Recording, slip_rad: f64, wheelbase_m: f64, blocks: Vec<Block>) -> Self {
+    pub fn new(recording: &Recording, slip_rad: f64, wheelbase_m: f64, sites: &[Site]) -> Self {
         let runs = &recording.runs;
         let speed_mps = recording.typical_speed_mps().max(0.5);
         let yaw = rms(runs.iter().flat_map(|r| r.measured[1].iter().copied()));
         let rate = |r: &Run| (0..r.len()).map(|k| slope(&r.steering_rad, k, r.dt_s)).collect::<Vec<_>>();
         Self {
-            blocks,
-            groups: Vec::new(),
+            blocks: sites.iter().flat_map(|site| blocks::of_site(*site)).copied().collect(),
+            groups: sites.iter().copied().map(Group::of).collect(),
             slip_rad: slip_rad.max(0.005),
             speed_mps,
             a_x_mps2: rms(runs.iter().flat_map(|r| r.a_x_mps2.iter().copied())),
@@ -125,24 +110,10 @@ impl Flexible {
         Self { blocks, groups: sites.iter().copied().map(Group::of).collect(), ..self.clone() }
     }
 
-    /// The sites with their parameters, in the parameters' order; none of those opened by room.
+    /// The sites with their parameters, in the parameters' order.
     #[must_use]
     pub fn groups(&self) -> &[Group] {
         &self.groups
-    }
-
-    fn is_by_site(&self) -> bool {
-        !self.groups.is_empty()
-    }
-
-    /// A series at each lag before a sample; by site what each further lag adds, so that a prior of one width suits all.
-    fn past(&self, terms: &mut [f64], series: &[f64], k: usize, lags_s: &[f64], dt_s: f64, size: f64) {
-        if self.is_by_site() {
-            return increments(terms, series, k, lags_s, dt_s, size);
-        }
-        for (term, &lag_s) in terms.iter_mut().zip(lags_s) {
-            *term = before(series, k, lag_s, dt_s) / size;
-        }
     }
 
     /// A block's own parameters, where it is open.
@@ -160,7 +131,7 @@ impl Flexible {
             let k = (from + i).min(run.len() - 1);
             let u = run.steering_rad[k] / size;
             let mut terms = [0.0; Block::Steering.terms()];
-            self.past(&mut terms, &run.steering_rad, k, &STEERING_LAGS_S, run.dt_s, size);
+            increments(&mut terms, &run.steering_rad, k, &STEERING_LAGS_S, run.dt_s, size);
             let rate = slope(&run.steering_rad, k, run.dt_s) / self.steering_rate_radps;
             let rest =
                 [0.3, 0.1 * u * u.abs(), 0.1 * u.powi(3), 0.3 * (3.0 * rate).tanh(), 0.1 * rate * rate.abs()];
@@ -245,7 +216,7 @@ impl Flexible {
         let v = run.v_x_mps[k] / self.speed_mps;
         if let Some(own) = self.of(p, Block::Drive) {
             let mut terms = [0.0; Block::Drive.terms()];
-            self.past(&mut terms, &run.force_x_mps2, k, &DRIVE_LAGS_S, run.dt_s, self.a_x_mps2);
+            increments(&mut terms, &run.force_x_mps2, k, &DRIVE_LAGS_S, run.dt_s, self.a_x_mps2);
             let f = terms[0];
             let a_y = run.v_x_mps[k] * run.smooth[1][k] / self.a_y_mps2;
             terms[DRIVE_LAGS_S.len()..].copy_from_slice(&[1.0, v, v * v, f * f.abs(), a_y * a_y]);
@@ -285,7 +256,7 @@ impl Flexible {
                 let mut more = *value * own[0];
                 let mut newer = *value;
                 for (late, c) in late.iter().zip(&own[1..]) {
-                    more += if self.is_by_site() { late[k] - newer } else { late[k] } * *c;
+                    more += (late[k] - newer) * *c;
                     newer = late[k];
                 }
                 let rest = &own[1 + SENSOR_LAGS_S.len()..];

@@ -2,9 +2,12 @@
 
 mod pictures;
 mod tables;
+mod words;
 
 use gripsight_identification::{Method, Outcome, PerAxle, Source, Status};
 use maud::html;
+
+pub use words::{estimate, peak_friction, status};
 
 use crate::page::{Tone, figure, list, page, section};
 use crate::text::{fixed, percent, significant, with_interval};

@@ -3,9 +3,10 @@
 use gripsight_identification::{Outcome, PeakFriction, PerAxle, Range};
 use maud::{Markup, html};
 
+use super::words::{estimate, peak_friction};
 use crate::health::health;
 use crate::page::{facts_table, list, table};
-use crate::text::{estimate, fixed, interval, peak_friction, percent, significant, with_interval};
+use crate::text::{fixed, interval, percent, significant, with_interval};
 
 /// Parameters, stiffness, grip and slip visited.
 pub(super) fn tires(outcome: &Outcome) -> Markup {

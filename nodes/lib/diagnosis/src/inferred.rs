@@ -1,0 +1,121 @@
+//! What the inference comes to, and what may be asked of it.
+
+use gripsight_estimation::selection::{Selection, Term};
+use gripsight_model::{EffectId, Site};
+use gripsight_vehicle::PacejkaParameters;
+
+use crate::columns::Columns;
+use crate::decisions;
+use crate::infer::FIRST;
+use crate::joint::Weighed;
+use crate::sizes::{Sized, Sizes};
+use crate::stated::Statement;
+
+/// What the inference comes to.
+#[derive(Debug, Clone)]
+pub(crate) struct Inferred {
+    pub(crate) columns: Columns,
+    /// The tires that the priors are around.
+    pub(crate) tires: PacejkaParameters,
+    /// Where everything was linearised last.
+    pub(crate) values: Vec<f64>,
+    pub(crate) selection: Selection,
+    /// The configuration that is left in the end.
+    pub(crate) chosen: Vec<usize>,
+    /// Its effects; `None` where held-out data were not asked.
+    pub(crate) stated: Option<Vec<Statement>>,
+    /// Probability that each term matters, confirmed by rollouts.
+    pub(crate) confirmed: Vec<f64>,
+    /// The most probable model's parameters.
+    pub(crate) sizes: Sizes,
+    pub(crate) terms: Vec<Term>,
+    pub(crate) weighed: Weighed,
+    /// How many times the errors' information is smaller than if they were independent.
+    pub(crate) dispersion: f64,
+    /// Noise of each channel.
+    pub(crate) sigma: Vec<f64>,
+    pub(crate) rounds: usize,
+}
+
+impl Inferred {
+    /// Place of an effect among the terms.
+    pub(crate) fn term_of(&self, effect: EffectId) -> Option<usize> {
+        self.columns.effects.iter().position(|e| *e == effect).map(|i| FIRST + i)
+    }
+
+    /// Places of a site's flexible terms among the terms.
+    pub(crate) fn terms_of_site(&self, site: Site) -> std::ops::Range<usize> {
+        let range = self.columns.of_site(site);
+        self.columns.term_of_flexible(range.start)..self.columns.term_of_flexible(range.end)
+    }
+
+    /// Probability that something is the matter at a site that no effect of the library does.
+    pub(crate) fn other(&self, site: Site) -> f64 {
+        let terms = self.terms_of_site(site);
+        let by_fit = self.selection.probability_that(|c| c[terms.clone()].iter().any(|&a| a > 0));
+        let needed = self.chosen[terms].iter().any(|&a| a > 0);
+        if needed { by_fit } else { by_fit.min(decisions::NEEDLESS) }
+    }
+
+    /// Whether the data were asked for an effect.
+    pub(crate) fn is_open(&self, effect: EffectId) -> bool {
+        self.term_of(effect).is_some_and(|t| self.terms[t].log_weights.len() > 1)
+    }
+
+    /// Probability that an effect matters: the chance that it is a cause where it is left in the model, that of the fit where held-out data were not
+    /// asked.
+    pub(crate) fn probability(&self, effect: EffectId) -> f64 {
+        let by_fit = self.term_of(effect).filter(|_| self.is_open(effect)).map_or(0.0, |t| self.confirmed[t]);
+        match (&self.stated, self.statement(effect)) {
+            (_, Some(statement)) => statement.chance(),
+            (Some(_), None) => by_fit.min(decisions::NEEDLESS),
+            (None, None) => by_fit,
+        }
+    }
+
+    /// Probability that an effect, or what does nearly the same at its site and is not among the candidates, matters.
+    pub(crate) fn probability_here(&self, effect: EffectId) -> f64 {
+        let own = self.probability(effect);
+        self.statement(effect).map_or(own, |s| (own * (1.0 + s.untried as f64)).min(1.0))
+    }
+
+    /// What is stated of an effect, if it is in the model.
+    pub(crate) fn statement(&self, effect: EffectId) -> Option<&Statement> {
+        let term = self.term_of(effect).filter(|_| self.is_open(effect))?;
+        self.stated.as_ref()?.iter().find(|s| s.term == term)
+    }
+
+    /// Whether the verdict names an effect: it is likely a cause, and not small beside what of the unexplained looks like it.
+    pub(crate) fn is_accepted(&self, effect: EffectId) -> bool {
+        let holds = |s: &Statement| {
+            s.chance() >= decisions::NAMED && s.over_unexplained >= decisions::LEAST_OVER_UNEXPLAINED
+        };
+        self.statement(effect).is_some_and(holds)
+    }
+
+    /// The terms with each effect that does not matter gone for good, but for what every car has: the narrow prior alone lets large evidence keep
+    /// it.
+    pub(crate) fn absent_terms(&self) -> Vec<Term> {
+        const GONE: f64 = 0.01;
+        let mut out = self.terms.clone();
+        for (effect, term) in self.columns.effects.iter().zip(&mut out[FIRST..]) {
+            if effect.spec().usual.is_none() {
+                term.priors.iter_mut().take(effect.sizing()).for_each(|p| p.sigma[0] *= GONE);
+            }
+        }
+        out
+    }
+
+    /// Parameters of an effect where it matters, and their standard deviations: those of the most probable model, if it has the effect, else of
+    /// the models that have it.
+    pub(crate) fn size(&self, effect: EffectId) -> Sized {
+        let Some(t) = self.term_of(effect) else { return (Vec::new(), Vec::new()) };
+        if let Some(sized) = self.sizes.effect(&self.columns, effect) {
+            return sized;
+        }
+        let wide = self.selection.mean[t].len() - 1;
+        let from = self.terms[t].from;
+        let mean = self.selection.mean[t][wide].iter().enumerate();
+        (mean.map(|(i, step)| self.values[from + i] + step).collect(), self.selection.sigma[t][wide].clone())
+    }
+}
