@@ -93,16 +93,18 @@ impl Inferred {
         self.statement(effect).is_some_and(holds)
     }
 
-    /// The terms with each effect that does not matter gone for good, but for what every car has: the narrow prior alone lets large evidence keep
-    /// it.
+    /// The terms with each effect that does not matter, but for what every car has, and each flexible term that is not needed gone for good: the narrow
+    /// prior alone lets large evidence keep them, and what they keep would be missing in what a site closes.
     pub(crate) fn absent_terms(&self) -> Vec<Term> {
         const GONE: f64 = 0.01;
         let mut out = self.terms.clone();
-        for (effect, term) in self.columns.effects.iter().zip(&mut out[FIRST..]) {
+        let (effects, flexible) = out[FIRST..].split_at_mut(self.columns.effects.len());
+        for (effect, term) in self.columns.effects.iter().zip(effects) {
             if effect.spec().usual.is_none() {
                 term.priors.iter_mut().take(effect.sizing()).for_each(|p| p.sigma[0] *= GONE);
             }
         }
+        flexible.iter_mut().flat_map(|term| &mut term.priors).for_each(|p| p.sigma[0] *= GONE);
         out
     }
 

@@ -60,6 +60,11 @@ fn an_effect_left_out_is_not_named_and_unknown_names_are_refused() {
     let recording = drive(&car(), &["v_y_bias=0.15"], DURATION_S, 23).unwrap();
     let d = diagnosed(&recording, &["v_y_bias".to_owned()]);
     assert!(d.effects.iter().all(|e| e.name != "v_y_bias"));
+    // Its site is named, closes what there is to close, and by nothing that has a name.
+    let site = &d.sites[0];
+    assert_eq!(site.name, "v_y", "{}", text(&d));
+    let shares = [site.closed_fraction.value, site.unexplained_fraction];
+    assert!(shares.iter().all(|s| *s > 0.5) && site.other_probability > 0.5, "{}", text(&d));
     let vehicle = nominal(&car());
     let request = Request { without: &["magic".to_owned()], ..Request::new(&recording, &vehicle) };
     let error = diagnose(&request, &mut |_| {}).unwrap_err();
