@@ -97,7 +97,10 @@ impl PairScores {
                 0.05,
             ),
             within("90 % intervals that hold the change", Rate::count(&covered, |c| *c)),
-            figure("error of the size, median", "small".to_owned(), median(errors), true),
+            Line {
+                met: None,
+                ..figure("relative error of the size, median", "no target".to_owned(), median(errors), true)
+            },
             at_least("missing structure recognised", Rate::count(of(Kind::OutOfLibrary), right), STRUCTURE),
             at_most(
                 "false alarms in unchanged pairs",
