@@ -300,7 +300,8 @@ impl Driver {
         let drive =
             limits.drive_at_mps2(state.v_x_mps) * left.max(LEAST_DRIVE) * if wide > 0.0 { 0.5 } else { 1.0 };
         // Whoever is too fast for a plan that was taken back has more to brake with than it says beside the turning.
-        let brake = limits.brake_mps2 * left.max(LEAST_BRAKE);
+        let least = if self.held_back() { LEAST_BRAKE } else { 0.15 };
+        let brake = limits.brake_mps2 * left.max(least);
         (speed_mps, wanted.clamp(-brake, drive))
     }
 
@@ -356,11 +357,9 @@ impl Driver {
             _ if base.trust == Trust::Accepted => alone,
             // A prior below what was driven and a step is no reason to drive slower, unless nothing was shown.
             Some(prior) if base.trust == Trust::Assumed => (share * prior.grip()).min(prior_step * driven),
-            Some(prior) => (share * prior.grip())
-                .min(LIKELY * likely)
-                .max(alone)
-                .min(prior_step * driven)
-                .min(beyond * shown),
+            Some(prior) => {
+                (LIKELY * prior.grip().min(likely)).max(alone).min(prior_step * driven).min(beyond * shown)
+            }
             None => alone,
         };
         self.caught.map_or(grip, |caught| grip.min(caught))

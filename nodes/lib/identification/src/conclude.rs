@@ -14,9 +14,9 @@ use crate::picture::{curves, trace};
 use crate::rollout::{NAMES, PARAMETERS, SIGNALS, TireRollout, vector_of};
 use crate::tires::on_bound;
 use crate::{
-    Change, Config, Estimate, FrictionPrior, HorizonError, Identification, IdentificationError, Nuisance,
-    Outcome, PeakFriction, PerAxle, ProvisionalSet, Range, Recorded, ResidualKind, Rmse, RmseReport, RunKey,
-    SignalCorrections, SignalEstimates, Source, Status, Trace, ValidWithin, WeakSignal,
+    Change, Config, Estimate, FrictionPrior, HorizonError, Identification, IdentificationError, Longitudinal,
+    Nuisance, Outcome, PeakFriction, PerAxle, ProvisionalSet, Range, Recorded, ResidualKind, Rmse,
+    RmseReport, RunKey, SignalCorrections, SignalEstimates, Source, Status, Trace, ValidWithin, WeakSignal,
 };
 
 /// The residual loop has to beat the direct fit on the validation part by this share: of near equals the simpler wins.
@@ -36,6 +36,7 @@ pub(crate) struct Request<'a> {
     pub(crate) prior: Option<FrictionPrior>,
     pub(crate) config: &'a Config,
     pub(crate) initial: &'a PacejkaParameters,
+    pub(crate) longitudinal: &'a Longitudinal,
     pub(crate) recorded: &'a Recorded,
 }
 
@@ -86,6 +87,7 @@ pub(crate) fn refused(
         curves: PerAxle::default(),
         prior: request.prior,
         grip: None,
+        longitudinal: request.longitudinal.clone(),
         health: health.clone(),
         drive_next,
         key: request.key.clone(),
@@ -171,6 +173,7 @@ pub(crate) fn conclude(run: &Identification, converged: bool) -> Result<Outcome,
         curves: curves(run, &found),
         prior: run.prior,
         grip: run.grip.clone(),
+        longitudinal: run.longitudinal.clone(),
         health: run.data.health.clone(),
         drive_next: Vec::new(),
         key,

@@ -16,6 +16,7 @@ mod extract;
 mod grip;
 mod judge;
 mod live;
+mod longitudinal;
 mod monitor;
 pub mod nelder_mead;
 mod outcome;
@@ -38,6 +39,7 @@ pub use envelope::ValidWithin;
 pub use error::IdentificationError;
 pub use grip::{GripLook, GripWatch};
 pub use live::{LiveResidual, LiveSample};
+pub use longitudinal::{Given, LimitsAt, Longitudinal, Told, longitudinal};
 pub use monitor::{Monitor, Reading};
 pub use outcome::{
     Change, HorizonError, IterationRecord, Outcome, PeakFriction, ProvisionalSet, Rmse, RmseReport,

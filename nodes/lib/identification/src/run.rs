@@ -22,8 +22,8 @@ use crate::start::{check, initial_tires, no_softer};
 use crate::sweep::{Point, Sweep, sweep};
 use crate::tires::curve_change;
 use crate::{
-    AcceptedSet, Candidate, Config, FrictionPrior, IdentificationError, IterationRecord, Method, Monitor,
-    Outcome, PerAxle, Reading, Recorded, ResidualModel, RunKey, Usable,
+    AcceptedSet, Candidate, Config, FrictionPrior, IdentificationError, IterationRecord, Longitudinal,
+    Method, Monitor, Outcome, PerAxle, Reading, Recorded, ResidualModel, RunKey, Usable, longitudinal,
 };
 
 /// What a run wants next.
@@ -98,6 +98,8 @@ pub struct Identification {
     /// Turns taken.
     pub(crate) history: Vec<IterationRecord>,
     pub(crate) candidate: Candidate,
+    /// What the drive tells of the drive train.
+    pub(crate) longitudinal: Longitudinal,
     /// What the signals say of each other.
     pub(crate) recorded: Recorded,
     /// What the initial tires leave over, see [`left_over`].
@@ -138,9 +140,17 @@ impl Identification {
         let key = RunKey::first(sequence, vehicle, config);
         let mut initial = initial_tires(prior, previous, config.method, &config.initial);
         let health = DataHealth::of(sequence)?;
+        let longitudinal = longitudinal(&usable.sequence, vehicle);
         let refuse = |reasons: Vec<String>, drive: Option<&str>| {
-            let request =
-                Request { key: &key, vehicle, prior, config, initial: &initial, recorded: &usable.recorded };
+            let request = Request {
+                key: &key,
+                vehicle,
+                prior,
+                config,
+                initial: &initial,
+                longitudinal: &longitudinal,
+                recorded: &usable.recorded,
+            };
             let drive_next = drive.map(str::to_owned).into_iter().collect();
             Started::Refused(Box::new(refused(&request, &health, reasons, drive_next)))
         };
@@ -191,6 +201,7 @@ impl Identification {
             direct_error: f64::INFINITY,
             history: Vec::new(),
             candidate,
+            longitudinal,
             recorded: usable.recorded.clone(),
             initial_left: [1.0; 2],
             ended: false,

@@ -6,9 +6,9 @@
 use std::f64::consts::TAU;
 
 use gripsight_identification::{
-    Change, Config, Estimate, FrictionPrior, HorizonError, IterationRecord, Nuisance, Outcome, PeakFriction,
-    PerAxle, ProvisionalSet, Range, Recorded, Rmse, RmseReport, RunKey, SignalCorrections, SignalEstimates,
-    Source, Status, TireCurve, Trace, ValidWithin, WeakSignal,
+    Change, Config, Estimate, FrictionPrior, HorizonError, IterationRecord, Longitudinal, Nuisance, Outcome,
+    PeakFriction, PerAxle, ProvisionalSet, Range, Recorded, Rmse, RmseReport, RunKey, SignalCorrections,
+    SignalEstimates, Source, Status, TireCurve, Trace, ValidWithin, WeakSignal,
 };
 use gripsight_report::{Header, IdentificationInput, identification_page};
 use gripsight_signals::DataHealth;
@@ -122,6 +122,7 @@ fn outcome() -> Outcome {
         },
         prior: Some(FrictionPrior { mu: 0.6, sigma: 0.1 }),
         grip: None,
+        longitudinal: Longitudinal::default(),
         health: DataHealth {
             samples: 6000,
             duration_s: 59.99,
