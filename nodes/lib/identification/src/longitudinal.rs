@@ -198,6 +198,8 @@ fn state(intervals: &[Interval], fits: &[((f64, f64), Fit<'_>)], keep: &[bool], 
         take(3, *delay_s, 0.5 * STEP_S);
         take(4, *lag_s, 0.5 * STEP_S);
     }
+    // Nothing follows before it is asked to.
+    low[3..].iter_mut().for_each(|low| *low = low.max(0.0));
     let v_sq = intervals.iter().map(|i| i.v_x_sq).sum::<f64>() / intervals.len() as f64;
     let told = |k: usize, value: f64, half: f64| Told::within(low[k], value, high[k], half);
     // Delay and lag of a command without effect mean nothing.
