@@ -31,8 +31,9 @@ pub struct DriveAnswer {
     pub retuned: Estimate,
     /// The same with what the diagnosis of all of them names.
     pub after: Estimate,
-    /// What differs in it from what all of them give together: a car in one state has nothing here.
-    pub contradicts: Vec<Change>,
+    /// What differs in it from what all of them give together: a car in one state has nothing here. Unknown (`null`) of a drive that cannot be compared:
+    /// it is too short by itself, or records other signals.
+    pub contradicts: Option<Vec<Change>>,
 }
 
 /// Errors drive by drive. `null`: tires alone, `model`: with the effects named.
@@ -57,7 +58,7 @@ pub(crate) fn errors(
             duration_s: span[1] - span[0],
             retuned: error(null),
             after: error(model),
-            contradicts: Vec::new(),
+            contradicts: None,
         }
     };
     together.spans_s.iter().enumerate().map(of).collect()
@@ -81,18 +82,18 @@ pub(crate) fn contradictions(
     together: &Together<'_>,
     request: &Request<'_>,
     progress: &mut dyn FnMut(&str),
-) -> Result<Vec<Vec<Change>>, GapError> {
+) -> Result<Vec<Option<Vec<Change>>>, GapError> {
     let mut out = Vec::new();
     for (number, drive) in together.alone.iter().enumerate() {
         progress(&format!("holding drive {} against all of them", number + 1));
-        let own = usable(&Request::new(drive, request.vehicle), &DataHealth::of(drive)?)?;
+        let own = usable(&Request::new(drive, request.vehicle), &DataHealth::of(drive)?).ok();
         // What only some drives record was left out of all of them.
-        if !all.matches(&own.recording) {
-            out.push(Vec::new());
+        let Some(own) = own.filter(|own| all.matches(&own.recording)) else {
+            out.push(None);
             continue;
-        }
+        };
         let (_, differences) = all.with_later(&own.recording, request.vehicle, &own.windows.training)?;
-        out.push(differences.likely());
+        out.push(Some(differences.likely()));
     }
     Ok(out)
 }

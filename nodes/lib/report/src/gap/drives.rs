@@ -34,7 +34,7 @@ pub(super) fn table(d: &Diagnosis) -> Markup {
             thead { tr { th { "Drive" } th { "Length" } th { "Error with other tires" } th { "With what is named" } th { "Beside all of them" } } }
             tbody {
                 @for drive in &d.drives {
-                    tr class=[(!drive.contradicts.is_empty()).then_some("named")] {
+                    tr class=[drive.contradicts.as_ref().is_some_and(|c| !c.is_empty()).then_some("named")] {
                         td { (drive.name) }
                         td { (fixed(drive.duration_s, 0)) " s" }
                         td { (known(&drive.retuned)) }
@@ -53,9 +53,12 @@ fn known(error: &Estimate) -> String {
 }
 
 fn contradicts(drive: &DriveAnswer) -> String {
-    if drive.contradicts.is_empty() {
-        return "agrees with the others".to_owned();
+    match drive.contradicts.as_deref() {
+        None => "not compared with the others: too short by itself, or with other signals".to_owned(),
+        Some([]) => "agrees with the others".to_owned(),
+        Some(changes) => {
+            let said: Vec<String> = changes.iter().map(change_words).collect();
+            format!("contradicts the others: {}", said.join("; "))
+        }
     }
-    let said: Vec<String> = drive.contradicts.iter().map(change_words).collect();
-    format!("contradicts the others: {}", said.join("; "))
 }
