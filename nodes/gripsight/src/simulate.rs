@@ -70,6 +70,12 @@ pub(crate) struct SimulateArgs {
     /// Record pictures of the road ahead, whose looks follow its friction, HZ of them a second (2 by default).
     #[arg(long, value_name = "HZ", num_args = 0..=1, default_missing_value = "2")]
     camera: Option<f64>,
+    /// Friction that the road looks like, where its looks lie: wet asphalt that grips, ice that looks dry.
+    #[arg(long, value_name = "MU", requires = "camera")]
+    looks_like: Option<f64>,
+    /// Seed of the road's looks, for several drives on one road [default: --seed].
+    #[arg(long, value_name = "N", requires = "camera")]
+    road: Option<u64>,
     /// Length of the run in seconds.
     #[arg(long, value_name = "S", default_value_t = 30.0)]
     duration: f64,
@@ -106,7 +112,7 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Outcome> {
     bar.finish_and_clear();
     let truth_path = beside(&args.out, "truth.csv");
     let vehicle_path = beside(&args.out, "vehicle.yaml");
-    let messages = write_bag(&args.out, &recording, args.seed)?;
+    let messages = write_bag(args, &recording)?;
     let file =
         File::create(&truth_path).with_context(|| format!("cannot create {}", truth_path.display()))?;
     write_truth_csv(BufWriter::new(file), &recording.truth, START_NS as f64 * 1e-9)?;
@@ -162,10 +168,12 @@ fn beside(bag: &Path, ending: &str) -> PathBuf {
     bag.with_file_name(format!("{stem}.{ending}"))
 }
 
-fn write_bag(path: &Path, recording: &Recording, seed: u64) -> anyhow::Result<usize> {
-    let mut bag = BagWriter::create(path)?;
-    let camera = RoadCamera::new(seed);
-    let mut exposures = recording.exposures.iter().peekable();
+fn write_bag(args: &SimulateArgs, recording: &Recording) -> anyhow::Result<usize> {
+    let mut bag = BagWriter::create(&args.out)?;
+    let camera = RoadCamera::new(args.road.unwrap_or(args.seed));
+    let looks = |e: &Exposure| Exposure { mu: args.looks_like.unwrap_or(e.mu), ..*e };
+    let exposures: Vec<Exposure> = recording.exposures.iter().map(looks).collect();
+    let mut exposures = exposures.iter().peekable();
     for sample in &recording.samples {
         while let Some(exposure) = exposures.next_if(|e| e.stamp_s <= sample.stamp_s()) {
             write_picture(&mut bag, &camera, exposure)?;

@@ -73,23 +73,36 @@ def table(title, data):
     return lines
 
 
-def priors(data):
-    lines = ["### Wrong priors", ""]
+def priors(title, data):
     usable = [r for r in data if r["status"].startswith("accepted")]
     over = [r for r in usable if worst(r, "over") > HARMFUL]
-    lines += [f"`accepted` or `accepted_within` sets that promise more than 10 % too much: {wilson(len(over), len(usable))}.", ""]
-    lines += ["| prior off by | provisional axles | D off by more than 25 % | promise more than 10 % too much within the slips driven |", "| --- | --- | --- | --- |"]
-    for low, high in [(-0.6, -0.3), (-0.3, -0.1), (-0.1, 0.1), (0.1, 0.3), (0.3, 0.6)]:
+    lines = [f"### {title}", ""]
+    lines += [
+        f"{len(data)} drives. `accepted` or `accepted_within` sets that promise more than 10 % too much: {wilson(len(over), len(usable))}.",
+        "",
+        "| prior off by | provisional sets | with a D off by more than 25 % | axles whose D is the prior's: off by more than 25 % | rms of ln(D/true) | promise more than 10 % too much within the slips driven |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for low, high in [(-0.6, -0.3), (-0.3, -0.1), (-0.1, 0.1), (0.1, 0.3), (0.3, 0.6), (-0.6, 0.6)]:
         inside = [r for r in data if low <= number(r["prior"]) - number(r["mu"]) < high]
-        axles = [
-            (number(r[f"d_prior_{a}"]), number(r[f"peak_true_{a}"]), number(r[f"over_prior_{a}"]))
+        sets = [
+            [
+                (number(r[f"d_prior_{a}"]) / number(r[f"peak_true_{a}"]), number(r[f"over_prior_{a}"]))
+                for a in "fr"
+                if not math.isnan(number(r[f"d_prior_{a}"]))
+            ]
             for r in inside
-            for a in "fr"
-            if not math.isnan(number(r[f"d_prior_{a}"]))
         ]
-        off = sum(abs(d / true - 1) > 0.25 for d, true, _ in axles)
-        above = sum(o > HARMFUL for _, _, o in axles)
-        lines.append(f"| {low} to {high} ({len(inside)} drives) | {len(axles)} | {wilson(off, len(axles))} | {wilson(above, len(axles))} |")
+        sets = [s for s in sets if s]
+        axles = [axle for s in sets for axle in s]
+        off = [abs(d - 1) > 0.25 for d, _ in axles]
+        off_sets = sum(any(abs(d - 1) > 0.25 for d, _ in s) for s in sets)
+        above = sum(o > HARMFUL for _, o in axles)
+        rms = math.sqrt(sum(math.log(d) ** 2 for d, _ in axles) / len(axles)) if axles else math.nan
+        name = "all" if high - low > 1 else f"{low} to {high}"
+        lines.append(
+            f"| {name} ({len(inside)} drives) | {len(sets)} | {wilson(off_sets, len(sets))} | {wilson(sum(off), len(axles))} | {rms:.2f} | {wilson(above, len(axles))} |"
+        )
     return lines + [""]
 
 
@@ -116,9 +129,13 @@ def main():
         data = rows(name)
         if data:
             text += table(title, data)
-    data = rows("envelope_priors.csv")
-    if data:
-        text += priors(data)
+    for title, name in [
+        ("Wrong priors", "envelope_priors.csv"),
+        ("Wrong priors, before: D as the fit with the prior has it", "envelope_priors_before.csv"),
+    ]:
+        data = rows(name)
+        if data:
+            text += priors(title, data)
     data = rows("envelope_bags.csv") + rows("envelope_foreign.csv")
     if data:
         text += bags(data)

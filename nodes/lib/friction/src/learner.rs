@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use crate::appearance::APPEARANCE;
-use crate::calibration::{Calibration, Example, RoadFriction};
+use crate::calibration::{Calibration, Example, FloorFriction};
 use crate::error::FrictionError;
 use crate::estimate::Estimate;
 
@@ -35,8 +35,8 @@ struct Sighting {
 pub struct Lesson {
     /// First and last stamp of the data, nanoseconds.
     pub span_ns: [i64; 2],
-    /// The road's friction.
-    pub friction: RoadFriction,
+    /// The friction that the tires reach there.
+    pub friction: FloorFriction,
     /// A name of its own for the lesson.
     pub name: String,
 }
@@ -171,7 +171,7 @@ mod tests {
     fn lesson(from_s: i64, to_s: i64, mu: f64, name: &str) -> Lesson {
         Lesson {
             span_ns: [from_s * S, to_s * S],
-            friction: RoadFriction { mu, sigma: 0.05 },
+            friction: FloorFriction { mu, sigma: 0.05 },
             name: name.into(),
         }
     }

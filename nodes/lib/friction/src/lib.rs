@@ -44,7 +44,7 @@ mod transport;
 pub use appearance::{APPEARANCE, appearance};
 pub use basis::{Basis, FrictionClass, Prior};
 pub use calibration::{
-    Calibration, Errors, Example, Kernel, Known, NETWORK_ERROR, RoadFriction, road_friction,
+    Calibration, Errors, Example, FloorFriction, Kernel, Known, NETWORK_ERROR, floor_friction,
 };
 pub use decode::decode;
 pub use error::FrictionError;

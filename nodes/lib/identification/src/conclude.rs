@@ -7,7 +7,7 @@ use gripsight_vehicle::{
 };
 
 use crate::data::Part;
-use crate::direct::{PeakEvidence, axle_sigma};
+use crate::direct::PeakEvidence;
 use crate::envelope::Envelope;
 use crate::judge::{best_starts, errors_over_horizon, one_step_errors, rollout_errors};
 use crate::picture::{curves, trace};
@@ -251,23 +251,26 @@ fn peak_friction(run: &Identification, tires: &PacejkaParameters) -> PerAxle<Pea
 
 /// The set with the friction prior; `None` where it has no say.
 fn provisional(run: &Identification) -> Option<ProvisionalSet> {
-    let (prior, tires) = (run.prior?, run.direct.with_prior?);
-    let half = Estimate::Z90 * axle_sigma(prior);
-    let axle = |axle: &MagicFormula, peak: &PeakEvidence| {
-        let from_prior = peak.is_the_priors(prior);
-        let (below, above) = if from_prior { (half, half) } else { (peak.below, peak.above) };
+    let with_prior = run.direct.with_prior?;
+    let axle = |axle: &MagicFormula, peak: &PeakEvidence, d_sigma: Option<f64>| {
+        let (below, above) = match d_sigma {
+            Some(sigma) => (Estimate::Z90 * sigma, Estimate::Z90 * sigma),
+            None => (peak.below, peak.above),
+        };
         PeakFriction {
             value: axle.d,
             low: (axle.d - below).max(0.0),
             high: axle.d + above,
             reached: peak.reached,
-            from_prior,
+            from_prior: d_sigma.is_some(),
         }
     };
-    let (peak, phi_p) = (&run.direct.peak, tires);
-    let peak_friction =
-        PerAxle { front: axle(&tires.front, &peak.front), rear: axle(&tires.rear, &peak.rear) };
-    Some(ProvisionalSet { phi_p, peak_friction })
+    let (peak, tires, sigma) = (&run.direct.peak, &with_prior.tires, &with_prior.d_sigma);
+    let peak_friction = PerAxle {
+        front: axle(&tires.front, &peak.front, sigma.front),
+        rear: axle(&tires.rear, &peak.rear, sigma.rear),
+    };
+    Some(ProvisionalSet { phi_p: *tires, peak_friction })
 }
 
 fn signal_intervals(run: &Identification) -> SignalEstimates {

@@ -5,8 +5,8 @@
 //!    which no simple model gets right, stays out of them.
 //! 2. All parameters on all windows. Gain and lever arm are freed only where that is worth it: at nearly one speed they are the stiffnesses in
 //!    disguise.
-//! 3. Beside that, and never in its place: where the peak is not reached the last fit is repeated with the friction prior as a soft bound on D;
-//!    unless the data contradict it.
+//! 3. Beside that, and never in its place: where the peak is not reached the last fit is repeated with the friction prior as a soft bound on D. Unless the
+//!    data contradict it, the curves are fitted once more to the D that prior, curve and force shown make believe.
 //!
 //! Which is identifiable from what: the yaw rate's bias from the heading alone (fixed then); delay from transients; offset and bias of v_y from driving
 //! straight; gain (against K_f) and lever arm (against K_r) from a range of speeds, and from nothing else. Every one has a prior.
@@ -33,10 +33,9 @@ use crate::{FrictionPrior, IdentificationError, PerAxle, Range, SignalCorrection
 use gripsight_estimation::shooting::{Fit, Parameter, Prior, Problem, StopReason, TOLERANCE, fit};
 
 pub(crate) use peak::{PeakEvidence, force_error};
-pub(crate) use prior::axle_sigma;
 
 use peak::evidence;
-use prior::{contradicts, with_prior};
+use prior::{believed, contradicts, with_believed, with_prior};
 use signals::signal_parameters;
 use weights::{Weights, weights};
 
@@ -76,7 +75,15 @@ pub(crate) struct Direct {
     pub(crate) slips: PerAxle<Slips>,
     pub(crate) peak: PerAxle<PeakEvidence>,
     /// The tires with the friction prior, where it has a say and the data do not contradict it.
-    pub(crate) with_prior: Option<PacejkaParameters>,
+    pub(crate) with_prior: Option<WithPrior>,
+}
+
+/// Tires that rest on a friction prior where the peak was not reached.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct WithPrior {
+    pub(crate) tires: PacejkaParameters,
+    /// Standard deviation of D; `None` where it rests on no prior.
+    pub(crate) d_sigma: PerAxle<Option<f64>>,
 }
 
 /// Slip angles visited, from the fitted trajectories (free of sensor noise).
@@ -310,7 +317,7 @@ impl Fitter<'_> {
         (all, found, weights, shift)
     }
 
-    /// The tires with the friction prior as a soft bound on D where the data do not show it; `None` where it has no say. Where the data contradict it,
+    /// The tires with the friction prior's say on D where the data do not show it; `None` where it has no say. Where the data contradict it,
     /// that is said of the peaks.
     fn with_prior(
         &self,
@@ -319,18 +326,21 @@ impl Fitter<'_> {
         peak: &mut PerAxle<PeakEvidence>,
         prior: FrictionPrior,
         weights: &Weights,
-    ) -> Result<Option<PacejkaParameters>, IdentificationError> {
+    ) -> Result<Option<WithPrior>, IdentificationError> {
         if ![peak.front, peak.rear].iter().any(|axle| axle.is_the_priors(prior)) {
             return Ok(None);
         }
-        let [held, likely] = with_prior(all, found, peak, prior)
-            .map(|all| self.solve(&all, &self.training, &weights.sigma, 30));
-        let with_it = if likely.linearization.cost < held.linearization.cost { likely } else { held };
+        let better = |starts: [Vec<Parameter>; 2]| {
+            let [held, likely] = starts.map(|all| self.solve(&all, &self.training, &weights.sigma, 30));
+            if likely.linearization.cost < held.linearization.cost { likely } else { held }
+        };
+        let with_it = better(with_prior(all, found, peak, prior));
         if contradicts(prior, peak, found, &with_it) {
             peak.front.contradicts_prior = true;
             peak.rear.contradicts_prior = true;
             return Ok(None);
         }
+        let with_it = better(with_believed(all, found, peak, prior));
         let (_, points) = self.visited(&with_it);
         let tires = tires_of(&with_it.parameters);
         let axle = |points, tire: &MagicFormula, peak: &PeakEvidence| {
@@ -338,9 +348,19 @@ impl Fitter<'_> {
             let d = tire.d.max(peak.height);
             nearest(points, tire, peak.is_the_priors(prior).then_some((d, d)))
         };
-        Ok(Some(PacejkaParameters {
-            front: axle(&points.front, &tires.front, &peak.front)?,
-            rear: axle(&points.rear, &tires.rear, &peak.rear)?,
+        let d_sigma = |d: f64, peak: &PeakEvidence| {
+            peak.is_the_priors(prior).then(|| believed(prior, d, peak.height).sigma)
+        };
+        let own = tires_of(&found.parameters);
+        Ok(Some(WithPrior {
+            tires: PacejkaParameters {
+                front: axle(&points.front, &tires.front, &peak.front)?,
+                rear: axle(&points.rear, &tires.rear, &peak.rear)?,
+            },
+            d_sigma: PerAxle {
+                front: d_sigma(own.front.d, &peak.front),
+                rear: d_sigma(own.rear.d, &peak.rear),
+            },
         }))
     }
 

@@ -1,35 +1,39 @@
-//! What a drive's tires say of the road's friction.
+//! What a drive's tires say of the floor.
 
-/// The axles' peak friction lies 5 to 20 % below the road's: neither of an axle's tires is at its peak when the other is, and both are loaded unevenly.
-const AXLE_OVER_ROAD: f64 = 0.875;
-/// Spread of that share.
-const SHARE_SIGMA: f64 = 0.043;
+/// Spread of one axle's peak friction about that of the car, as a share of it: unlike loads and combined slip take 5 to 20 % of an axle's.
+const AXLE_SHARE: f64 = 0.043;
 /// Standard normal quantile of a 90 % interval.
 const Z90: f64 = 1.645;
 
-/// A road's peak friction coefficient.
+/// The peak friction that this car's tires reach on a floor: D of its axles. It is what the prior is used for, so what is learned is what is told, whatever
+/// share of the road's friction an axle reaches.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RoadFriction {
+pub struct FloorFriction {
     /// Best estimate.
     pub mu: f64,
     /// Its standard deviation.
     pub sigma: f64,
 }
 
-/// The road's friction by the axles' peaks, each (value, low, high) of a 90 % interval: those that were reached and rest on no prior. None without one.
+/// A floor's friction by the axles' peaks, each (value, low, high) of a 90 % interval: those that were reached and rest on no prior; one is enough. None
+/// without one.
 #[must_use]
-pub fn road_friction(peaks: &[[f64; 3]]) -> Option<RoadFriction> {
-    let known: Vec<&[f64; 3]> =
-        peaks.iter().filter(|p| p.iter().all(|x| x.is_finite()) && p[0] > 0.0 && p[1] <= p[2]).collect();
-    let count = known.len() as f64;
+pub fn floor_friction(peaks: &[[f64; 3]]) -> Option<FloorFriction> {
+    let known =
+        peaks.iter().filter(|p| p.iter().all(|x| x.is_finite()) && p[0] > 0.0 && p[1] <= p[2]).map(|p| {
+            let variance = ((p[2] - p[1]) / (2.0 * Z90)).powi(2) + (AXLE_SHARE * p[0]).powi(2);
+            (p[0], 1.0 / variance)
+        });
+    let known: Vec<(f64, f64)> = known.collect();
+    let weight: f64 = known.iter().map(|(_, w)| w).sum();
     if known.is_empty() {
         return None;
     }
-    let mean = known.iter().map(|p| p[0]).sum::<f64>() / count;
-    let interval = known.iter().map(|p| (p[2] - p[1]) / (2.0 * Z90)).sum::<f64>() / count;
-    let apart = known.iter().map(|p| (p[0] - mean).abs()).fold(0.0, f64::max);
-    let mu = mean / AXLE_OVER_ROAD;
-    Some(RoadFriction { mu, sigma: (interval.hypot(apart) / AXLE_OVER_ROAD).hypot(SHARE_SIGMA * mu) })
+    let mu = known.iter().map(|(d, w)| w * d).sum::<f64>() / weight;
+    // Axles further apart than both allow for: one of the intervals is wrong, and nobody knows which.
+    let apart: f64 = known.iter().map(|(d, w)| w * (d - mu).powi(2)).sum();
+    let degrees = known.len().saturating_sub(1).max(1) as f64;
+    Some(FloorFriction { mu, sigma: ((apart / degrees).max(1.0) / weight).sqrt() })
 }
 
 #[cfg(test)]
@@ -38,13 +42,15 @@ mod tests {
     use approx::assert_relative_eq;
 
     #[test]
-    fn a_road_grips_more_than_its_axles_show() {
-        let got = road_friction(&[[0.70, 0.68, 0.72], [0.70, 0.66, 0.74]]).unwrap();
-        assert_relative_eq!(got.mu, 0.8, epsilon = 1e-12);
-        assert!(got.sigma > 0.03 && got.sigma < 0.06);
-        let apart = road_friction(&[[0.60, 0.59, 0.61], [0.80, 0.79, 0.81]]).unwrap();
-        assert!(apart.sigma > 0.1, "{apart:?}");
-        assert_eq!(road_friction(&[]), None);
-        assert_eq!(road_friction(&[[0.7, f64::NAN, 0.8]]), None);
+    fn the_label_is_what_the_axles_reach_the_surer_one_first() {
+        let one = floor_friction(&[[0.70, 0.68, 0.72]]).unwrap();
+        assert_relative_eq!(one.mu, 0.70, epsilon = 1e-12);
+        assert!(one.sigma > 0.03 && one.sigma < 0.04, "{one:?}");
+        let both = floor_friction(&[[0.70, 0.68, 0.72], [0.78, 0.58, 0.98]]).unwrap();
+        assert!(both.mu > 0.70 && both.mu < 0.73 && both.sigma < one.sigma, "{both:?}");
+        let apart = floor_friction(&[[0.60, 0.59, 0.61], [0.80, 0.79, 0.81]]).unwrap();
+        assert!(apart.sigma > 0.08, "{apart:?}");
+        assert_eq!(floor_friction(&[]), None);
+        assert_eq!(floor_friction(&[[0.7, f64::NAN, 0.8]]), None);
     }
 }

@@ -13,7 +13,7 @@ use crate::appearance::{APPEARANCE, LEAST_SCALE};
 use crate::error::FrictionError;
 use process::{Process, distance2};
 
-pub use label::{RoadFriction, road_friction};
+pub use label::{FloorFriction, floor_friction};
 pub use process::Kernel;
 
 /// Error of the network on photographs of real roads of which it has seen none, root of the mean square over dry, wet and snow.
@@ -29,7 +29,7 @@ const FRICTIONS: [f64; 2] = [0.03, 2.0];
 pub struct Example {
     /// What it looks like, [`crate::appearance`].
     pub appearance: Vec<f64>,
-    /// Peak friction coefficient of the road there.
+    /// Peak friction that the car's tires reach there.
     pub mu: f64,
     /// Standard deviation of that.
     pub sigma: f64,
