@@ -17,12 +17,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-# Name, friction, friction that it looks like, road (seed of its looks), track, pace: at the limit, as a driver does who wants to know it.
+# Name, friction, friction that it looks like, road (seed of its looks), track or manoeuvre, pace: at the limit, as a driver does who wants to know it. Where
+# the road holds more than the car can ask of it on a track it is a slow steering ramp on an open space.
 FLOORS = [
-    ("asphalt", 0.90, 0.90, 9101, "clover", 1.10),
+    ("asphalt", 0.90, 0.90, 9101, "ramp_steer", 1.00),
     ("damp asphalt", 0.60, 0.60, 9102, "clover", 1.15),
     ("standing water", 0.45, 0.45, 9103, "bean", 1.10),
-    ("dark wet asphalt that grips", 0.85, 0.50, 9104, "clover", 1.10),
+    ("dark wet asphalt that grips", 0.85, 0.50, 9104, "ramp_steer", 1.00),
     ("ice that looks dry", 0.40, 0.85, 9105, "bean", 1.10),
     ("snow that looks like wet asphalt", 0.30, 0.60, 9106, "esses", 1.10),
 ]

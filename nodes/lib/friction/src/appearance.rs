@@ -4,7 +4,7 @@ use crate::picture::RgbPicture;
 use crate::quality::gradients;
 
 /// The numbers' names, in their order.
-pub const APPEARANCE: [&str; 14] = [
+pub const APPEARANCE: [&str; 16] = [
     "luma",
     "luma_spread",
     "red_green",
@@ -19,20 +19,23 @@ pub const APPEARANCE: [&str; 14] = [
     "texture_16",
     "saturation",
     "luma_slope",
+    "red_green_of_scene",
+    "yellow_blue_of_scene",
 ];
 
 /// Differences of these numbers that mean nothing: two pictures of one place differ by as much.
 pub(crate) const LEAST_SCALE: [f64; APPEARANCE.len()] =
-    [10.0, 0.15, 1.5, 0.15, 1.5, 0.15, 0.2, 0.2, 0.1, 0.1, 0.1, 0.1, 0.03, 0.2];
+    [10.0, 0.15, 1.5, 0.15, 1.5, 0.15, 0.2, 0.2, 0.1, 0.1, 0.1, 0.1, 0.03, 0.2, 1.5, 1.5];
 
 /// Measures a picture at the network's input size.
 ///
 /// `luma`, `red_green`, `yellow_blue`: means of luma and of the opponent colours r - g and (r + g)/2 - b, levels of 255. `..._spread`: logarithms of
 /// their standard deviations. `highlights`, `shadows`: how far the 98 % and 2 % quantiles of luma lie from the median, in spreads. `texture_n`:
 /// logarithm of the mean step of luma over n pixels, over the spread. `saturation`: mean of (max - min)/(max + 16). `luma_slope`: upper less lower third,
-/// in spreads. A picture of less than 32 x 32 pixels gives zeros.
+/// in spreads. `..._of_scene`: the two colours less those of the whole frame, `scene`, which takes out the light's colour and the camera's white balance.
+/// A picture of less than 32 x 32 pixels gives zeros.
 #[must_use]
-pub fn appearance(picture: &RgbPicture) -> [f64; APPEARANCE.len()] {
+pub fn appearance(picture: &RgbPicture, scene: [f64; 2]) -> [f64; APPEARANCE.len()] {
     let (columns, rows) = (picture.width as usize / 2, picture.height as usize / 2);
     if columns < 16 || rows < 16 || picture.data.len() < columns * rows * 12 {
         return [0.0; APPEARANCE.len()];
@@ -95,6 +98,8 @@ pub fn appearance(picture: &RgbPicture) -> [f64; APPEARANCE.len()] {
         texture(3),
         saturation / count,
         (third(0) - third(rows - rows / 3)) / (spreads[0] + 5.0),
+        means[1] - scene[0],
+        means[2] - scene[1],
     ]
 }
 
@@ -110,19 +115,22 @@ mod tests {
 
     #[test]
     fn colours_and_slope_are_what_was_painted() {
-        let got = appearance(&picture(|_, y| if y < 112 { [140, 100, 60] } else { [100, 60, 20] }));
+        let painted = picture(|_, y| if y < 112 { [140, 100, 60] } else { [100, 60, 20] });
+        let got = appearance(&painted, [30.0, 20.0]);
         // 0.3 (r - g) + ...: luma of (140, 100, 60) is 107, of (100, 60, 20) 67.
         assert_relative_eq!(got[0], 87.5, epsilon = 1.0);
         assert_relative_eq!(got[2], 40.0, epsilon = 1e-3);
         assert_relative_eq!(got[4], 60.0, epsilon = 1e-3);
         assert!(got[13] > 1.0, "{got:?}");
+        assert_relative_eq!(got[14], 10.0, epsilon = 1e-3);
+        assert_relative_eq!(got[15], 40.0, epsilon = 1e-3);
     }
 
     #[test]
     fn coarse_grain_differs_from_fine_grain_at_the_same_contrast() {
         let stripes =
             |period: u32| move |x: u32, _: u32| [if (x / period).is_multiple_of(2) { 90 } else { 150 }; 3];
-        let (fine, coarse) = (appearance(&picture(stripes(4))), appearance(&picture(stripes(16))));
+        let [fine, coarse] = [4, 16].map(|period| appearance(&picture(stripes(period)), [0.0; 2]));
         assert_relative_eq!(fine[1], coarse[1], epsilon = 0.01);
         assert!(fine[8] > coarse[8] + 0.5 && fine[11] < coarse[11], "{fine:?} {coarse:?}");
     }

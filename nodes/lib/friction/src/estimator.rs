@@ -180,7 +180,7 @@ impl FrictionEstimator {
         let crop = self.crop(&frame.data)?;
         let input = self.seen.insert(self.preprocessor.resize(&crop)?);
         let quality = QualityStatistics::measure(input);
-        let appearance = appearance(input);
+        let appearance = appearance(input, self.finder.scene());
         let mut reading = Reading {
             p: self.flat(),
             prior: self.basis.uninformative,
@@ -201,16 +201,17 @@ impl FrictionEstimator {
     }
 
     fn crop(&mut self, data: &FrameData<'_>) -> Result<RgbPicture, FrictionError> {
-        match &self.settings.region {
-            Look::At(region) => decode(data, region),
-            Look::Auto if self.finder.wants_a_look() => {
-                let whole = decode(data, &Region::WHOLE)?;
-                self.finder.look(&whole);
-                let region = self.finder.region().unwrap_or(Region::WHOLE);
-                Ok(whole.crop(&region))
-            }
-            Look::Auto => decode(data, &self.finder.region().unwrap_or(Region::WHOLE)),
-        }
+        let whole = match self.finder.wants_a_look() {
+            true => Some(decode(data, &Region::WHOLE)?),
+            false => None,
+        };
+        whole.iter().for_each(|whole| self.finder.look(whole));
+        let found = self.finder.region().unwrap_or(Region::WHOLE);
+        let region = match self.settings.region {
+            Look::At(region) => region,
+            Look::Auto => found,
+        };
+        whole.map_or_else(|| decode(data, &region), |whole| Ok(whole.crop(&region)))
     }
 
     /// Fills in what the network says, and joins it with what the calibration does.

@@ -60,8 +60,17 @@ impl FromStr for Look {
 /// Finds the road in a stream of pictures.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct RoadFinder {
-    found: VecDeque<[f64; 4]>,
+    found: VecDeque<Seen>,
     since: u32,
+}
+
+/// What a look found.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    /// Left, top, right, bottom of the road.
+    edges: [f64; 4],
+    /// The two opponent colours of the whole picture.
+    colour: [f64; 2],
 }
 
 impl RoadFinder {
@@ -74,16 +83,24 @@ impl RoadFinder {
     pub(crate) fn region(&mut self) -> Option<Region> {
         self.since += 1;
         let edge = |k: usize| {
-            let mut edges: Vec<f64> = self.found.iter().map(|f| f[k]).collect();
-            edges.sort_by(f64::total_cmp);
-            edges.get(edges.len() / 2).copied()
+            (!self.found.is_empty()).then(|| median(self.found.iter().map(|f| f.edges[k]).collect()))
         };
         Region::new(edge(0)?, edge(1)?, edge(2)?, edge(3)?).ok()
     }
 
+    /// The colours of the scene by the last looks, levels of r - g and of (r + g)/2 - b.
+    pub(crate) fn scene(&self) -> [f64; 2] {
+        [0, 1].map(|k| median(self.found.iter().map(|f| f.colour[k]).collect()))
+    }
+
     /// Looks at a whole picture.
     pub(crate) fn look(&mut self, picture: &RgbPicture) {
-        self.found.push_back(find(picture));
+        if picture.width == 0 || picture.height == 0 {
+            return;
+        }
+        let cells = cells(picture);
+        let [_, red_green, yellow_blue] = mean(&cells, 0..ROWS, &(0..COLUMNS));
+        self.found.push_back(Seen { edges: find(&cells), colour: [red_green, yellow_blue] });
         if self.found.len() > LOOKS {
             self.found.pop_front();
         }
@@ -129,15 +146,11 @@ fn beyond(a: [f64; 3], b: [f64; 3], limits: [f64; 3]) -> bool {
 }
 
 /// Left, top, right, bottom of the road.
-fn find(picture: &RgbPicture) -> [f64; 4] {
+fn find(cells: &[[f64; 3]]) -> [f64; 4] {
     const ALL: [f64; 4] = [0.0, 0.0, 1.0, 1.0];
-    if picture.width == 0 || picture.height == 0 {
-        return ALL;
-    }
-    let cells = cells(picture);
     let (all, middle) = (0..COLUMNS, COLUMNS / 4..COLUMNS * 3 / 4);
-    let parts = [0..ROWS * 2 / 5, ROWS * 3 / 5..ROWS].map(|rows| mean(&cells, rows, &all));
-    let rows: Vec<[f64; 3]> = (0..ROWS).map(|row| mean(&cells, row..row + 1, &middle)).collect();
+    let parts = [0..ROWS * 2 / 5, ROWS * 3 / 5..ROWS].map(|rows| mean(cells, rows, &all));
+    let rows: Vec<[f64; 3]> = (0..ROWS).map(|row| mean(cells, row..row + 1, &middle)).collect();
     if !beyond(parts[0], parts[1], PARTS_DIFFER) && !rows.windows(5).any(|w| beyond(w[0], w[4], ROWS_DIFFER))
     {
         return ALL;
@@ -203,12 +216,12 @@ mod tests {
     #[test]
     fn the_road_lies_between_horizon_and_bonnet() {
         for (horizon, bonnet) in [(0.4, 0.9), (0.55, 1.0), (0.3, 0.95)] {
-            let [left, top, right, bottom] = find(&frame(horizon, bonnet));
+            let [left, top, right, bottom] = find(&cells(&frame(horizon, bonnet)));
             assert!(top > horizon && top < horizon + 0.25, "{horizon}: {top}");
             assert!(bottom <= bonnet + 0.01 && bottom > bonnet - 0.1, "{bonnet}: {bottom}");
             assert!(left > 0.1 && right < 0.9);
         }
-        assert_eq!(find(&frame(0.0, 1.0)), [0.0, 0.0, 1.0, 1.0]);
+        assert_eq!(find(&cells(&frame(0.0, 1.0))), [0.0, 0.0, 1.0, 1.0]);
     }
 
     #[test]
@@ -219,6 +232,9 @@ mod tests {
         let before = finder.region().unwrap();
         finder.look(&frame(0.0, 1.0));
         assert_eq!(finder.region(), Some(before));
+        // Half of it sky, of 165 - 240 in blue; the bonnet red.
+        let [red_green, yellow_blue] = finder.scene();
+        assert!(red_green > -10.0 && red_green < 10.0 && yellow_blue < -20.0, "{:?}", finder.scene());
         (0..10).for_each(|_| assert!(finder.region().is_some()));
         assert!(finder.wants_a_look());
     }

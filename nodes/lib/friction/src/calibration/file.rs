@@ -10,7 +10,7 @@ use crate::error::FrictionError;
 
 use super::{Calibration, Errors, Example, Kernel, bad};
 
-const SCHEMA: &str = "gripsight.friction_calibration/1";
+const SCHEMA: &str = "gripsight.friction_calibration/2";
 
 /// What the file holds. The examples are the function's centres: all else follows from them, and stands there for whoever reads the file.
 #[derive(Serialize, Deserialize)]
@@ -21,7 +21,7 @@ struct Content {
     features: Vec<String>,
     mean: Vec<f64>,
     scale: Vec<f64>,
-    kernel: Kernel,
+    kernels: Vec<(f64, Kernel)>,
     sigma_factor: f64,
     new_distance: f64,
     errors: Errors,
@@ -58,7 +58,7 @@ impl Calibration {
             features: APPEARANCE.map(str::to_owned).to_vec(),
             mean: self.mean.clone(),
             scale: self.scale.clone(),
-            kernel: self.kernel,
+            kernels: self.process.kernels().collect(),
             sigma_factor: self.sigma_factor,
             new_distance: self.new_distance,
             errors: self.errors,
@@ -147,7 +147,7 @@ mod tests {
     fn a_changed_or_foreign_file_is_refused() {
         let text = learned().to_json().unwrap();
         for (from, to) in
-            [("\"mu\": 0.8", "\"mu\": 0.7"), ("calibration/1", "calibration/9"), ("\"luma\"", "\"lumen\"")]
+            [("\"mu\": 0.8", "\"mu\": 0.7"), ("calibration/2", "calibration/9"), ("\"luma\"", "\"lumen\"")]
         {
             assert!(text.contains(from));
             assert!(Calibration::from_json(&text.replacen(from, to, 1)).is_err(), "{from}");

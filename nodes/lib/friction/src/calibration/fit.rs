@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::appearance::APPEARANCE;
 use crate::error::FrictionError;
 
-use super::process::{Kernel, Process, distance2};
+use super::process::{Kernel, Mixture, Process, distance2};
 use super::{Calibration, Errors, Example, NETWORK_ERROR, bad, scale_of, scaled};
 
 /// Pictures from which on there is something to learn.
@@ -22,8 +22,12 @@ const NEAR_MARGIN: f64 = 1.3;
 /// Pictures of one place differ by this much, in scales.
 const LEAST_NEW_DISTANCE: f64 = 0.5;
 
-/// How much the choice of the shape flatters sigma, over the root of the number of parts.
-const CHOSEN: f64 = 1.8;
+/// How much the shapes' shares, which come from these very parts, flatter sigma, over the root of the number of parts.
+const CHOSEN: f64 = 0.9;
+/// How much of what was left out counts in a shape's share: parts of a source are alike.
+const COUNTED: f64 = 0.5;
+/// Shapes with less than this share of the likeliest one's do not speak.
+const LEAST_SHARE: f64 = 0.05;
 
 const LENGTHS: [f64; 5] = [0.5, 0.7, 1.0, 1.4, 2.0];
 const LINEAR: [f64; 2] = [0.0, 0.05];
@@ -59,15 +63,16 @@ impl Calibration {
         let inputs: Vec<Vec<f64>> = examples.iter().map(|e| scaled(&e.appearance, &mean, &scale)).collect();
         let weights = balanced(&examples);
         let parts = parts(&examples);
-        let mut best: Option<(f64, Kernel)> = None;
+        let mut scores = vec![];
         for kernel in kernels() {
-            let score = surprise(&process(kernel, &inputs, &examples)?.left_out(&parts), &weights);
-            if best.is_none_or(|(least, _)| score < least) {
-                best = Some((score, kernel));
-            }
+            let left_out = process(kernel, &inputs, &examples)?.left_out(&parts);
+            scores.push((surprise(&left_out, &weights), kernel));
         }
-        let (_, kernel) = best.ok_or_else(|| bad("no shape of the function fits"))?;
-        let process = process(kernel, &inputs, &examples)?;
+        let mut members = vec![];
+        for (share, kernel) in shares(&scores, parts.len()) {
+            members.push((share, process(kernel, &inputs, &examples)?));
+        }
+        let process = Mixture::new(members);
         let left_out = process.left_out(&parts);
         let (known, sigma_factor, within_sigma) = spread(&left_out, &weights, parts.len());
         let sources = grouped(&examples, |e| (e.source.clone(), 0));
@@ -78,7 +83,6 @@ impl Calibration {
         Ok(Self {
             track: track.to_owned(),
             examples,
-            kernel,
             errors,
             mean,
             scale,
@@ -87,6 +91,18 @@ impl Calibration {
             process,
         })
     }
+}
+
+/// The shapes that speak, and their shares: how likely each makes what was left out of it. One shape alone would be believed beyond what the examples say.
+fn shares(scores: &[(f64, Kernel)], parts: usize) -> Vec<(f64, Kernel)> {
+    let least = scores.iter().map(|(score, _)| *score).fold(f64::INFINITY, f64::min);
+    let likely = |score: f64| (-COUNTED * parts as f64 * (score - least)).exp();
+    let mut shares: Vec<(f64, Kernel)> =
+        scores.iter().map(|(score, kernel)| (likely(*score), *kernel)).collect();
+    shares.retain(|(share, _)| *share >= LEAST_SHARE);
+    let sum: f64 = shares.iter().map(|(share, _)| share).sum();
+    shares.iter_mut().for_each(|(share, _)| *share /= sum);
+    shares
 }
 
 fn kernels() -> impl Iterator<Item = Kernel> {
@@ -163,7 +179,7 @@ fn spread(left_out: &[(f64, f64)], weights: &[f64], parts: usize) -> (f64, f64, 
     // Few parts tell little of the spread: they count with two parts of twice the expected size.
     let squares = mean(&|e, v| e * e / v);
     let factor = ((squares * parts as f64 + 4.0) / (parts as f64 + 2.0)).sqrt().max(1.0);
-    // The shape was chosen on these very parts: the fewer they are, the better it seems.
+    // The shares were chosen on these very parts: the fewer they are, the better they seem.
     let factor = factor * (1.0 + CHOSEN / (parts as f64).sqrt());
     let within = mean(&|e, v| if e.abs() < factor * v.sqrt() { 1.0 } else { 0.0 });
     (mean(&|e, _| e * e).sqrt(), factor, within)

@@ -11,7 +11,7 @@ mod process;
 
 use crate::appearance::{APPEARANCE, LEAST_SCALE};
 use crate::error::FrictionError;
-use process::{Process, distance2};
+use process::{Mixture, distance2};
 
 pub use label::{FloorFriction, floor_friction};
 pub use process::Kernel;
@@ -79,7 +79,6 @@ pub struct Errors {
 pub struct Calibration {
     track: String,
     examples: Vec<Example>,
-    kernel: Kernel,
     errors: Errors,
     mean: Vec<f64>,
     scale: Vec<f64>,
@@ -87,7 +86,7 @@ pub struct Calibration {
     sigma_factor: f64,
     /// Distance from the nearest example above which a picture shows a new floor.
     new_distance: f64,
-    process: Process,
+    process: Mixture,
 }
 
 impl Calibration {
@@ -107,12 +106,6 @@ impl Calibration {
     #[must_use]
     pub fn errors(&self) -> &Errors {
         &self.errors
-    }
-
-    /// The function's shape.
-    #[must_use]
-    pub fn kernel(&self) -> &Kernel {
-        &self.kernel
     }
 
     /// What it says of a picture with this [`crate::appearance`].

@@ -92,6 +92,47 @@ impl Process {
     }
 }
 
+/// Processes of several shapes that speak together, each by its share.
+#[derive(Debug, Clone)]
+pub(super) struct Mixture {
+    members: Vec<(f64, Process)>,
+}
+
+impl Mixture {
+    /// `members`: their shares, which sum to one.
+    pub(super) fn new(members: Vec<(f64, Process)>) -> Self {
+        Self { members }
+    }
+
+    /// Shares and shapes.
+    pub(super) fn kernels(&self) -> impl Iterator<Item = (f64, Kernel)> {
+        self.members.iter().map(|(share, process)| (*share, process.kernel))
+    }
+
+    /// Mean and variance of a picture's friction.
+    pub(super) fn read(&self, x: &[f64]) -> (f64, f64) {
+        moments(self.members.iter().map(|(share, process)| (*share, process.read(x))))
+    }
+
+    /// As [`Process::left_out`].
+    pub(super) fn left_out(&self, groups: &[Vec<usize>]) -> Vec<(f64, f64)> {
+        let each: Vec<(f64, Vec<(f64, f64)>)> =
+            self.members.iter().map(|(share, process)| (*share, process.left_out(groups))).collect();
+        let count = each.first().map_or(0, |(_, left_out)| left_out.len());
+        (0..count).map(|i| moments(each.iter().map(|(share, left_out)| (*share, left_out[i])))).collect()
+    }
+}
+
+/// Mean and variance of a mixture of means and variances.
+fn moments(members: impl Iterator<Item = (f64, (f64, f64))>) -> (f64, f64) {
+    let (mut first, mut second) = (0.0, 0.0);
+    for (share, (mean, variance)) in members {
+        first += share * mean;
+        second += share * (variance + mean * mean);
+    }
+    (first, second - first * first)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -120,6 +161,13 @@ mod tests {
             assert_relative_eq!(got[i].0, labels[i] - mu, epsilon = 1e-9);
             assert_relative_eq!(got[i].1, variance + 0.02 * 0.02, epsilon = 1e-9);
         }
+    }
+
+    #[test]
+    fn a_mixture_doubts_where_its_members_disagree() {
+        let (mean, variance) = moments([(0.5, (0.4, 0.01)), (0.5, (0.8, 0.01))].into_iter());
+        assert_relative_eq!(mean, 0.6, epsilon = 1e-12);
+        assert_relative_eq!(variance, 0.05, epsilon = 1e-12);
     }
 
     #[test]
