@@ -5,7 +5,8 @@
 
 Every floor is driven by the reference car with pictures of it (`gripsight simulate --camera`), identified (`identify`, without a network in the loop:
 the prior is what is looked at), taught (`friction calibrate --results`, all drives so far), and read before the next drive (`friction`), with
-what was taught and without. The truth is the peak force over the load of the car's axles in a slow steering ramp on that floor. OUT keeps
+what was taught and without. At last one track of all floors: what their first drives taught together, read on the last drives; and what the
+others taught, on a floor that was left out. The truth is the peak force over the load of the car's axles in a slow steering ramp on that floor. OUT keeps
 bags and results and is gone on with; learning.csv beside this file receives a row a drive.
 """
 
@@ -72,6 +73,7 @@ class Floor:
 
     def drives(self, count):
         truth, taught, file = self.truth(), [], self.folder / "track.json"
+        self.lessons = []
         for k in range(count):
             pace = ("--track", self.track, "--pace", self.pace, "--seed", 100 * self.road + k)
             bag = self.simulate(
@@ -93,6 +95,14 @@ class Floor:
                 taught.append(("--results", f"{out}={bag}"))
                 results = [word for pair in taught for word in pair]
                 self.run("friction", "calibrate", *results, "--out", file)
+                self.lessons = results if k < count - 1 else self.lessons
+
+    def last(self, name, floors, file):
+        """The last drive, read with what some floors taught."""
+        self.run("friction", "calibrate", *[word for f in floors for word in f.lessons], "--out", file)
+        bag = max(self.folder.glob("drive*.mcap"))
+        said = self.read(bag, "--calibration", file)
+        return [self.name, name, self.mu, self.looks, self.truth(), *self.read(bag)[:2], *said, "", "", ""]
 
 
 def main():
@@ -106,11 +116,21 @@ def main():
     with Path(__file__).with_name("learning.csv").open("w", newline="") as file:
         rows = csv.writer(file, lineterminator="\n")
         rows.writerow(head)
-        for floor in FLOORS:
-            for row in Floor(args, floor).drives(args.drives):
-                rows.writerow([f"{x:.4f}" if isinstance(x, float) else x for x in row])
-                file.flush()
-                print(row[0], row[1], f"D {row[4]:.2f}, network {row[5]:.2f}, start {row[7]:.2f} +- {row[8]:.2f}", row[10:])
+
+        def say(row):
+            rows.writerow([f"{x:.4f}" if isinstance(x, float) else x for x in row])
+            file.flush()
+            print(row[0], row[1], f"D {row[4]:.2f}, network {row[5]:.2f}, start {row[7]:.2f} +- {row[8]:.2f}", row[9:])
+
+        floors = [Floor(args, floor) for floor in FLOORS]
+        for floor in floors:
+            for row in floor.drives(args.drives):
+                say(row)
+        for floor in floors:
+            say(floor.last("all floors", floors, args.out / "all.json"))
+        for floor in floors:
+            others = [f for f in floors if f is not floor]
+            say(floor.last("other floors", others, args.out / "others.json"))
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
 """The camera prior on photographs of real roads that nothing was trained on: the network alone, and after some labelled pictures.
 
-    real_roads.py PICTURES [--bin gripsight] [--draws N] > real_roads_runs.csv
+    real_roads.py PICTURES [--bin gripsight] [--draws N] [--table real_roads_fresh.csv] > real_roads_runs.csv
 
-PICTURES holds the folders of real_roads.csv (file, state by eye, start of the SHA-256): google_bing_yahoo_flickr/250x250 of
-github.com/kagan94/road_image_datasets. They are web pictures without a licence: read here, trained on nowhere, not part of this project. Each is of
+PICTURES holds the folders of the table (file, state by eye, start of the SHA-256): google_bing_yahoo_flickr/250x250 of
+github.com/kagan94/road_image_datasets. Development was done on real_roads.csv; the pictures of real_roads_fresh.csv were labelled before, and
+read once. They are web pictures without a licence: read here, trained on nowhere, not part of this project. Each is of
 another place, camera and season, which is harder than one track. A draw takes N pictures of each state at random (its seed), learns from them with
 `gripsight friction calibrate`, and reads all others with `gripsight friction --calibration`.
 """
@@ -49,8 +50,9 @@ def main():
     parser.add_argument("--bin", default="target/release/gripsight")
     parser.add_argument("--draws", type=int, default=10)
     parser.add_argument("--counts", type=int, nargs="*", default=[5, 10, 20])
+    parser.add_argument("--table", default="real_roads.csv")
     args = parser.parse_args()
-    with open(Path(__file__).with_name("real_roads.csv"), newline="", encoding="utf-8") as table:
+    with open(Path(__file__).with_name(args.table), newline="", encoding="utf-8") as table:
         rows = list(csv.DictReader(table))
     for row in rows:
         digest = hashlib.sha256((args.pictures / row["file"]).read_bytes()).hexdigest()
