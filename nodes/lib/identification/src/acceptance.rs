@@ -32,6 +32,7 @@ pub(crate) fn judge(run: &Identification, envelope: &Envelope, outcome: &mut Out
     let mut verdict = Verdict::default();
     changed_grip(run, outcome, &mut verdict);
     verdict.remarks.extend(run.recorded.estimated.iter().map(ToString::to_string));
+    one_floor(run, &mut verdict);
     bounds(outcome, &mut verdict);
     prediction(run, outcome, &mut verdict);
     stability(run, envelope, outcome, &mut verdict);
@@ -67,6 +68,19 @@ fn changed_grip(run: &Identification, outcome: &Outcome, verdict: &mut Verdict) 
             "{notice}; tires fitted to the {left_s:.1} s driven since, with that as D's prior"
         ));
     }
+}
+
+/// A grip that changed under way: what was fitted is neither the one nor the other.
+fn one_floor(run: &Identification, verdict: &mut Verdict) {
+    let Some(change) = &run.direct.grip_change else { return };
+    let (then, now) = (&change.before, &change.after);
+    verdict.against.push(format!(
+        "the grip changed {:.1} s after the start: D {:.2} -> {:.2} front, {:.2} -> {:.2} rear; one set is true on neither floor",
+        change.at_s, then.front.value, now.front.value, then.rear.value, now.rear.value
+    ));
+    verdict
+        .drive
+        .push("identify what lies before the change and what lies after it, each by itself".to_owned());
 }
 
 /// Parameters that are not finite or on a bound. On a bound is what the drive does not hold: a peak that was not reached, or the shape. No more is promised

@@ -11,6 +11,7 @@
 //! Which is identifiable from what: the yaw rate's bias from the heading alone (fixed then); delay from transients; offset and bias of v_y from driving
 //! straight; gain (against K_f) and lever arm (against K_r) from a range of speeds, and from nothing else. Every one has a prior.
 
+mod change;
 mod errors;
 mod peak;
 mod prior;
@@ -32,8 +33,10 @@ use crate::tires::{C_PRIOR, E_PRIOR, parameters};
 use crate::{FrictionPrior, IdentificationError, PerAxle, Range, SignalCorrections};
 use gripsight_estimation::shooting::{Fit, Parameter, Prior, Problem, StopReason, TOLERANCE, fit};
 
+pub(crate) use change::GripChange;
 pub(crate) use peak::{PeakEvidence, force_error};
 
+use change::change_within;
 use peak::evidence;
 use prior::{believed, contradicts, with_believed, with_prior};
 use signals::signal_parameters;
@@ -76,6 +79,8 @@ pub(crate) struct Direct {
     pub(crate) peak: PerAxle<PeakEvidence>,
     /// The tires with the friction prior, where it has a say and the data do not contradict it.
     pub(crate) with_prior: Option<WithPrior>,
+    /// A floor that changed under way.
+    pub(crate) grip_change: Option<GripChange>,
 }
 
 /// Tires that rest on a friction prior where the peak was not reached.
@@ -153,6 +158,7 @@ pub(crate) fn direct(
     }
     let errors = fitter.solve(&open, &fitter.training, &weights.sigma, 0);
     let covariance = errors::covariance(&errors, &open, &data.doubt);
+    let grip_change = change_within(&fitter.model, data, &found.parameters, &weights.sigma);
     let allowed = nuisance_of(&found.parameters);
     let fitted = tires_of(&found.parameters);
     Ok(Direct {
@@ -182,6 +188,7 @@ pub(crate) fn direct(
         slips,
         peak,
         with_prior,
+        grip_change,
     })
 }
 

@@ -34,3 +34,22 @@ fn after_a_change_of_grip_the_new_road_is_identified_and_accepted_though_its_pea
     let again = identify(&same, &vehicle, None, Some(&set), &config, &mut |_| {}).unwrap();
     assert!(!again.grip.unwrap().changed && again.prior.is_none());
 }
+
+#[test]
+fn two_floors_in_one_drive_are_not_averaged() {
+    let config = Config { residual: ResidualKind::None, ..Config::default() };
+    let on = |mu, friction, pace| {
+        let drive_on = scenario("f1tenth", "esses", mu, pace, 2).friction(friction).duration(40.0);
+        let (_, sequence, vehicle) = drive(with_background(drive_on));
+        identify(&sequence, &vehicle, None, None, &config, &mut |_| {}).unwrap()
+    };
+    for (mu, mu_after, pace) in [(0.4, 0.85, 0.9), (0.6, 0.42, 0.63)] {
+        let both = on(mu, Friction::Changing { mu, mu_after, at_s: 20.0, over_s: 1.0 }, pace);
+        let reason = both.reasons.iter().find(|r| r.starts_with("the grip changed"));
+        let reason = reason.unwrap_or_else(|| panic!("{:?}", both.reasons));
+        let at_s: f64 = reason.split_whitespace().nth(3).unwrap().parse().unwrap();
+        assert!(!both.accepted && (at_s - 20.0).abs() < 2.0, "{reason}");
+        let one = on(mu, Friction::Uniform { mu }, pace);
+        assert!(one.accepted, "{:?}", one.reasons);
+    }
+}

@@ -1,0 +1,139 @@
+//! Whether the grip stayed the same over a run: tires fitted to two floors are those of neither.
+//!
+//! At some places in time D of both axles is fitted anew to what lies before and to what lies after, everything else held; the place at which both together
+//! fit best counts. A floor changed there if an axle's D differs by more than its uncertainty and by more than what tires and models make of one floor, and
+//! if both sides came near their D: one that was not come near is the curve's form alone.
+
+use gripsight_estimation::shooting::{Fit, Parameter, Problem, TOLERANCE, fit};
+use gripsight_model::Window;
+use gripsight_vehicle::GRAVITY_MPS2;
+
+use super::{ROBUST_K, SPREAD};
+use crate::data::{Data, quantile};
+use crate::rollout::TireRollout;
+use crate::tires::D_BOUNDS;
+use crate::{Estimate, PerAxle};
+
+/// Parts between whose ends the change is looked for; fewer windows than this on a side say nothing.
+const PARTS: usize = 10;
+const LEAST_WINDOWS: usize = 10;
+/// How often the place is moved to where it fits better.
+const REFINED: usize = 3;
+/// D of both sides has to differ by so many standard errors,
+const SIGNIFICANT: f64 = 4.0;
+/// and by this share of the smaller: slips of other sizes, warm tires and a model that is too simple make less of one floor.
+const NOTICEABLE: f64 = 0.2;
+/// Either side turned with at least this share of its mean D.
+const SHOWN: f64 = 0.75;
+/// What a side turned with is this quantile of the lateral acceleration.
+const TURNED: f64 = 0.98;
+/// Place of D of either axle.
+const D: [usize; 2] = [2, 6];
+
+/// A change of the grip within a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct GripChange {
+    /// Since the start of the sequence.
+    pub(crate) at_s: f64,
+    /// D before.
+    pub(crate) before: PerAxle<Estimate>,
+    /// D after.
+    pub(crate) after: PerAxle<Estimate>,
+}
+
+/// The change of grip, if there was one. `parameters`: of the fit to all; `sigma`: what its residuals were divided by.
+pub(super) fn change_within(
+    model: &TireRollout<'_>,
+    data: &Data,
+    parameters: &[f64],
+    sigma: &[f64; 2],
+) -> Option<GripChange> {
+    let windows: Vec<Window> = data.windows.iter().map(|(w, _)| *w).collect();
+    let run = |at: &[f64], windows: &[Window], peaks_free: bool| {
+        let parameter = |(j, &start): (usize, &f64)| {
+            let free = peaks_free && D.contains(&j);
+            let (low, high) = if free { D_BOUNDS } else { (f64::NEG_INFINITY, f64::INFINITY) };
+            Parameter { start, low, high, free, prior: None }
+        };
+        let all: Vec<Parameter> = at.iter().enumerate().map(parameter).collect();
+        let (robust_k, tolerance, max_iterations) = (ROBUST_K, TOLERANCE, 15);
+        let problem =
+            Problem { model, windows, sigma, parameters: &all, robust_k, tolerance, max_iterations };
+        fit(&problem, None)
+    };
+    let solve = |windows: &[Window]| run(parameters, windows, true);
+    let costs = |at: &[f64]| run(at, &windows, false).linearization.window_costs;
+    let sides = |place: usize| (solve(&windows[..place]), solve(&windows[place..]));
+    let last = windows.len().checked_sub(LEAST_WINDOWS)?;
+    let places = (1..PARTS).map(|k| k * windows.len() / PARTS).filter(|k| (LEAST_WINDOWS..=last).contains(k));
+    let cost = |(_, (a, b)): &(usize, (Fit, Fit))| a.linearization.cost + b.linearization.cost;
+    let first = places.map(|place| (place, sides(place))).min_by(|a, b| cost(a).total_cmp(&cost(b)))?;
+    // The coarse place mixes both floors on one side: from there to where each window fits better with the other side's D.
+    let (mut place, (mut before, mut after)) = first;
+    for _ in 0..REFINED {
+        let better = between(&costs(&before.parameters), &costs(&after.parameters), last)?;
+        if better == place {
+            break;
+        }
+        place = better;
+        (before, after) = sides(place);
+    }
+    // As a share of the smaller D; a D on its bound is not known.
+    let share = |j: usize| {
+        let (a, b) = (before.parameters[j], after.parameters[j]);
+        let known = !before.on_bound.contains(&j) && !after.on_bound.contains(&j);
+        known.then(|| (b - a) / a.min(b))
+    };
+    let shown = |fit: &Fit, windows: &[Window]| {
+        turned(data, windows) > SHOWN * 0.5 * (fit.parameters[D[0]] + fit.parameters[D[1]])
+    };
+    let near = shown(&before, &windows[..place]) && shown(&after, &windows[place..]);
+    let significant = |j: usize| {
+        let change = (after.parameters[j] - before.parameters[j]).abs();
+        let errors = before.standard_error(j).zip(after.standard_error(j));
+        errors.is_some_and(|(e, f)| change > SIGNIFICANT * SPREAD * e.hypot(f))
+    };
+    let shares = [share(D[0])?, share(D[1])?];
+    let one = [0, 1].into_iter().any(|axle| shares[axle].abs() > NOTICEABLE && significant(D[axle]));
+    // A floor lies under both axles.
+    let both = shares[0] * shares[1] > 0.0 && shares.into_iter().all(|s| s.abs() > 0.5 * NOTICEABLE);
+    let window = &windows[place];
+    let segment = &data.segments[window.segment];
+    let peaks = |fit: &Fit| {
+        let axle =
+            |j: usize| Estimate::from_error(fit.parameters[j], fit.standard_error(j).map(|e| SPREAD * e));
+        PerAxle { front: axle(D[0]), rear: axle(D[1]) }
+    };
+    (one && both && near).then(|| GripChange {
+        at_s: segment.start_time_s + window.from as f64 * segment.dt_s,
+        before: peaks(&before),
+        after: peaks(&after),
+    })
+}
+
+/// Lateral acceleration that the car turned with in some windows, over gravity: in a turn the force over the load of either axle.
+fn turned(data: &Data, windows: &[Window]) -> f64 {
+    let samples = windows.iter().flat_map(|w| {
+        let s = &data.segments[w.segment];
+        (w.from..w.from + w.len).map(|k| (s.v_x_mps[k] * s.yaw_rate_radps[k]).abs())
+    });
+    quantile(&mut samples.collect::<Vec<f64>>(), TURNED).unwrap_or(0.0) / GRAVITY_MPS2
+}
+
+/// The window before which the old tires and from which on the new ones cost least together, at least [`LEAST_WINDOWS`] from either end.
+fn between(old: &[f64], new: &[f64], last: usize) -> Option<usize> {
+    let total = |place: usize| old[..place].iter().sum::<f64>() + new[place..].iter().sum::<f64>();
+    (LEAST_WINDOWS..=last).min_by(|&a, &b| total(a).total_cmp(&total(b)))
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_change_lies_where_both_sides_cost_least() {
+        let mut old = [1.0; 26];
+        old[14..].fill(5.0);
+        assert_eq!(super::between(&old, &[4.0; 26], 16), Some(14));
+        assert_eq!(super::between(&old, &[0.0; 26], 16), Some(10));
+        assert_eq!(super::between(&old[..12], &[4.0; 12], 2), None);
+    }
+}
