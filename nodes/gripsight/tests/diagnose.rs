@@ -92,7 +92,8 @@ fn diagnose_and_identify_take_the_extended_model_again() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let run = |arguments: &str| assert_eq!(gripsight(folder, arguments).0, 0, "{arguments}");
-    run("simulate --effect steering_delay=0.03 --duration 20 --seed 62 --out laps.mcap");
+    // Quick movements tell a delay from a lag.
+    run("simulate --effect steering_delay=0.03 --dither 0.01 --duration 20 --seed 62 --out laps.mcap");
     run("diagnose laps.mcap --vehicle laps.vehicle.yaml --out first --predictions first.mcap");
     let first = json(&folder.join("first/gap.json"));
     assert_eq!(first["effects"][0]["name"], "steering_delay");

@@ -14,6 +14,8 @@ use crate::joint::Joint;
 
 /// Iterations of the fit between two linearisations.
 const ITERATIONS: usize = 4;
+/// Iterations at most of a fit that is compared with others.
+const ITERATIONS_TO_THE_END: usize = 20;
 /// Parameters that a fit can move; what is beyond stays at the linear answer.
 const MOST_FREE: usize = 78;
 /// Chord steps at most, and the gain in twice the log evidence below which no more are made.
@@ -48,6 +50,7 @@ pub(crate) struct Pruned {
 }
 
 /// A configuration fitted by rollouts.
+#[derive(Debug, Clone)]
 pub(crate) struct Refined {
     pub(crate) values: Vec<f64>,
     pub(crate) starts: Vec<[f64; 2]>,
@@ -94,15 +97,33 @@ impl Around<'_, '_> {
 
     /// Logarithm of a configuration's evidence by rollouts instead of the linearisation; its prior weight counted.
     pub(crate) fn by_rollouts(&self, problem: &Quadratic, chosen: &[usize]) -> Option<(f64, Refined)> {
+        self.by_rollouts_in(ITERATIONS, problem, chosen)
+    }
+
+    /// The same, as far as it goes.
+    pub(crate) fn by_rollouts_to_the_end(
+        &self,
+        problem: &Quadratic,
+        chosen: &[usize],
+    ) -> Option<(f64, Refined)> {
+        self.by_rollouts_in(ITERATIONS_TO_THE_END, problem, chosen)
+    }
+
+    fn by_rollouts_in(
+        &self,
+        iterations: usize,
+        problem: &Quadratic,
+        chosen: &[usize],
+    ) -> Option<(f64, Refined)> {
         let linear = configuration(problem, self.dispersion, self.terms, chosen)?;
-        let (refined, cost) = self.refined(chosen, &linear.step);
+        let (refined, cost) = self.refined(iterations, chosen, &linear.step);
         let log = linear.log_occam - 0.5 * cost / self.dispersion;
         log.is_finite().then_some((log, refined))
     }
 
     /// The model of a configuration fitted by rollouts, and its cost with the priors' share. Terms that it has only as little of as any car are absent
     /// there, but for those that every car has.
-    fn refined(&self, chosen: &[usize], step: &DVector<f64>) -> (Refined, f64) {
+    fn refined(&self, iterations: usize, chosen: &[usize], step: &DVector<f64>) -> (Refined, f64) {
         let Self { engine, columns, terms, values, starts, windows, dispersion, .. } = *self;
         let in_use = self.in_use(chosen);
         let mut target = columns.blank(engine);
@@ -130,7 +151,7 @@ impl Around<'_, '_> {
                 }),
             });
         }
-        let problem = engine.problem(&model, &windows.windows, &parameters, ITERATIONS);
+        let problem = engine.problem(&model, &windows.windows, &parameters, iterations);
         let from_step = shooting::descend(&problem, Some(starts.to_vec()));
         let best = if from_step.at.cost.is_finite() {
             from_step
@@ -141,7 +162,7 @@ impl Around<'_, '_> {
                 .zip(&map)
                 .filter(|(p, _)| p.free)
                 .for_each(|(p, &c)| p.start = values[c].clamp(p.low, p.high));
-            let problem = engine.problem(&model, &windows.windows, &held, ITERATIONS);
+            let problem = engine.problem(&model, &windows.windows, &held, iterations);
             shooting::descend(&problem, Some(starts.to_vec()))
         };
         for (&column, &v) in map.iter().zip(&best.parameters) {

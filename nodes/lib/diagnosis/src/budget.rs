@@ -50,7 +50,15 @@ pub(crate) struct Scorer<'a> {
     scored_on: &'static str,
 }
 
+/// Where too little was driven to hold any out.
+const TOO_LITTLE: &str = "training blocks (too little data to hold any out)";
+
 impl<'a> Scorer<'a> {
+    /// Whether it scores on data that nothing is fitted to.
+    pub(crate) fn is_apart(&self) -> bool {
+        self.scored_on != TOO_LITTLE
+    }
+
     pub(crate) fn new(engine: &Engine<'a>, other: Option<&'a Recording>, windows: &Split) -> Self {
         match other {
             // The other bag has its own noise; models and weights are those fitted here.
@@ -62,7 +70,7 @@ impl<'a> Scorer<'a> {
             None if windows.held_out.windows.is_empty() => Self {
                 engine: engine.clone(),
                 windows: of_length(engine.recording, &windows.training, HORIZON_S),
-                scored_on: "training blocks (too little data to hold any out)",
+                scored_on: TOO_LITTLE,
             },
             None => Self {
                 engine: engine.clone(),

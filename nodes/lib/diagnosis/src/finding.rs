@@ -11,6 +11,7 @@ use crate::answer::{MechanismAnswer, SiteAnswer};
 use crate::budget::Budget;
 use crate::decisions;
 use crate::engine::Engine;
+use crate::infer::FIRST;
 use crate::inferred::Inferred;
 use crate::outcome::{DetectionLimit, RankedEffect};
 use crate::sizes::{reported, with_half_widths};
@@ -101,6 +102,10 @@ pub(crate) fn detection_limits(engine: &Engine<'_>, inferred: &Inferred) -> Vec<
 /// What is there where an effect is not.
 fn confused(inferred: &Inferred, library: &[EffectId], effect: EffectId) -> Vec<EffectId> {
     let mut out: Vec<EffectId> = untried(effect, library).collect();
+    let rivals: Vec<(EffectId, f64)> = inferred.statement(effect).map_or_else(Vec::new, |s| {
+        s.rivals.iter().map(|(t, _)| (inferred.columns.effects[t - FIRST], s.chance_instead(*t))).collect()
+    });
+    out.extend(rivals.iter().filter(|(_, chance)| *chance >= decisions::LISTED).map(|(e, _)| *e));
     let visited = &inferred.selection.visited;
     let Some(own) = inferred.term_of(effect) else { return out };
     let without: Vec<&Vec<u8>> = visited.iter().filter(|c| c[own] == 0).collect();
@@ -117,7 +122,9 @@ fn confused(inferred: &Inferred, library: &[EffectId], effect: EffectId) -> Vec<
             .is_some_and(|t| share(&without, t) >= IN_ITS_PLACE && share(&with, t) < 0.5 * share(&without, t))
     };
     let near = |e: &EffectId| e.spec().sites.iter().any(|s| effect.spec().sites.contains(s));
-    let others = inferred.columns.effects.iter().copied().filter(|e| *e != effect && near(e) && instead(e));
+    // Those that were put in its place need no guess.
+    let asked = |e: &EffectId| *e == effect || rivals.iter().any(|(r, _)| r == e);
+    let others = inferred.columns.effects.iter().copied().filter(|e| !asked(e) && near(e) && instead(e));
     out.extend(others);
     out
 }
@@ -143,7 +150,7 @@ pub(crate) fn sites(inferred: &Inferred, effects: &[RankedEffect]) -> Vec<SiteAn
             let terms: Vec<usize> = here.iter().filter_map(|e| inferred.term_of(*e)).collect();
             let other = inferred.terms_of_site(site);
             // Nothing is the matter if nothing of all this is.
-            let nothing = here.iter().map(|e| 1.0 - inferred.probability_here(*e)).product::<f64>();
+            let nothing = here.iter().map(|e| 1.0 - inferred.probability_of_alike(*e)).product::<f64>();
             let probability = 1.0 - nothing * (1.0 - inferred.other(site));
             let mut mechanisms: Vec<MechanismAnswer> = here
                 .iter()

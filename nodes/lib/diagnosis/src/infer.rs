@@ -125,7 +125,7 @@ pub(crate) fn infer(
             let confirmed = around.confirmed(&weighed.total, &selection, &losses)?;
             progress("asking data that nothing was fitted to");
             let Stated { chosen: best, fitted, statements: mut stated } =
-                around.stated(&weighed.total, (best, fitted), closed, scorer, &confirmed)?;
+                around.stated(&weighed, best, closed, scorer, &confirmed)?;
             let sizes = Sizes::of(&around, library, &best, &fitted, windows)?;
             for statement in &mut stated {
                 let effect = columns.effects[statement.term - FIRST];

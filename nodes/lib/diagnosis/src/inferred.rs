@@ -9,7 +9,7 @@ use crate::decisions;
 use crate::infer::FIRST;
 use crate::joint::Weighed;
 use crate::sizes::{Sized, Sizes};
-use crate::stated::Statement;
+use crate::statement::Statement;
 
 /// What the inference comes to.
 #[derive(Debug, Clone)]
@@ -62,21 +62,32 @@ impl Inferred {
         self.term_of(effect).is_some_and(|t| self.terms[t].log_weights.len() > 1)
     }
 
-    /// Probability that an effect matters: the chance that it is a cause where it is left in the model, that of the fit where held-out data were not
-    /// asked.
+    /// Probability that an effect matters: the chance that it is a cause where it is left in the model or does as well in another's place, that of the
+    /// fit where held-out data were not asked.
     pub(crate) fn probability(&self, effect: EffectId) -> f64 {
-        let by_fit = self.term_of(effect).filter(|_| self.is_open(effect)).map_or(0.0, |t| self.confirmed[t]);
-        match (&self.stated, self.statement(effect)) {
-            (_, Some(statement)) => statement.chance(),
-            (Some(_), None) => by_fit.min(decisions::NEEDLESS),
-            (None, None) => by_fit,
-        }
+        let in_place =
+            self.statement(effect).map_or_else(|| self.probability_instead(effect), Statement::chance);
+        in_place.max(self.probability_beside(effect))
     }
 
-    /// Probability that an effect, or what does nearly the same at its site and is not among the candidates, matters.
-    pub(crate) fn probability_here(&self, effect: EffectId) -> f64 {
-        let own = self.probability(effect);
-        self.statement(effect).map_or(own, |s| (own * (1.0 + s.untried as f64)).min(1.0))
+    /// Probability that an effect, or what does nearly the same, matters; what does nearly the same as an effect of the model counts there.
+    pub(crate) fn probability_of_alike(&self, effect: EffectId) -> f64 {
+        self.statement(effect).map_or_else(|| self.probability_beside(effect), Statement::chance_of_alike)
+    }
+
+    /// Chance that an effect is a cause in the place of one that is left in the model.
+    pub(crate) fn probability_instead(&self, effect: EffectId) -> f64 {
+        let Some(term) = self.term_of(effect) else { return 0.0 };
+        self.stated.iter().flatten().map(|s| s.chance_instead(term)).fold(0.0, f64::max)
+    }
+
+    /// Probability that an effect which is not in the model matters beside it.
+    fn probability_beside(&self, effect: EffectId) -> f64 {
+        if self.statement(effect).is_some() {
+            return 0.0;
+        }
+        let by_fit = self.term_of(effect).filter(|_| self.is_open(effect)).map_or(0.0, |t| self.confirmed[t]);
+        if self.stated.is_some() { by_fit.min(decisions::NEEDLESS) } else { by_fit }
     }
 
     /// What is stated of an effect, if it is in the model.
@@ -85,10 +96,11 @@ impl Inferred {
         self.stated.as_ref()?.iter().find(|s| s.term == term)
     }
 
-    /// Whether the verdict names an effect: it is likely a cause, and not small beside what of the unexplained looks like it.
+    /// Whether the verdict names an effect: it, or another candidate that does nearly the same, is likely a cause, and not small beside what of the unexplained looks like it.
     pub(crate) fn is_accepted(&self, effect: EffectId) -> bool {
         let holds = |s: &Statement| {
-            s.chance() >= decisions::NAMED && s.over_unexplained >= decisions::LEAST_OVER_UNEXPLAINED
+            s.chance_of_candidates() >= decisions::NAMED
+                && s.over_unexplained >= decisions::LEAST_OVER_UNEXPLAINED
         };
         self.statement(effect).is_some_and(holds)
     }

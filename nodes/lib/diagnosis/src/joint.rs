@@ -143,19 +143,22 @@ impl Joint {
         if product > 0.0 && square > 0.0 { product * product / square } else { 0.0 }
     }
 
+    /// The windows of each block.
+    fn blocks(&self) -> Vec<Vec<usize>> {
+        let mut out: Vec<(usize, Vec<usize>)> = Vec::new();
+        for (k, &b) in self.block.iter().enumerate() {
+            match out.last_mut().filter(|l| l.0 == b) {
+                Some(last) => last.1.push(k),
+                None => out.push((b, vec![k])),
+            }
+        }
+        out.into_iter().map(|b| b.1).collect()
+    }
+
     /// The problem where channel `c` has `scale[c]` times the noise that it was linearised with.
     pub(crate) fn weighed(&self, scale: &[f64]) -> Weighed {
-        let blocks: Vec<Vec<usize>> = {
-            let mut out: Vec<(usize, Vec<usize>)> = Vec::new();
-            for (k, &b) in self.block.iter().enumerate() {
-                match out.last_mut().filter(|l| l.0 == b) {
-                    Some(last) => last.1.push(k),
-                    None => out.push((b, vec![k])),
-                }
-            }
-            out.into_iter().map(|b| b.1).collect()
-        };
-        let parts: Vec<(Quadratic, f64, f64)> = blocks
+        let parts: Vec<(Quadratic, f64, f64)> = self
+            .blocks()
             .par_iter()
             .map(|members| {
                 let reduced: Vec<_> = members.iter().map(|&k| self.parts[k].reduced(scale)).collect();
@@ -215,6 +218,8 @@ pub(crate) struct Trial {
     pub(crate) cost: f64,
     /// Half its derivative by each column.
     pub(crate) gradient: DVector<f64>,
+    /// Both, block by block.
+    pub(crate) blocks: Vec<(f64, DVector<f64>)>,
     /// How far the best start states are from those given.
     pub(crate) shifts: Vec<[f64; 2]>,
 }
@@ -248,16 +253,15 @@ impl Joint {
                 part.looked_at(residual, scale)
             })
             .collect();
-        let mut out = Trial {
-            cost: 0.0,
-            gradient: DVector::zeros(self.columns),
-            shifts: Vec::with_capacity(parts.len()),
-        };
-        for (cost, gradient, shift) in parts {
-            out.cost += cost;
-            out.gradient += gradient;
-            out.shifts.push(shift);
-        }
+        let zero = (0.0, DVector::zeros(self.columns));
+        let shifts = parts.iter().map(|p| p.2).collect();
+        let blocks: Vec<(f64, DVector<f64>)> = self
+            .blocks()
+            .iter()
+            .map(|members| members.iter().fold(zero.clone(), |(c, g), &k| (c + parts[k].0, g + &parts[k].1)))
+            .collect();
+        let (cost, gradient) = blocks.iter().fold(zero, |(c, g), b| (c + b.0, g + &b.1));
+        let out = Trial { cost, gradient, blocks, shifts };
         (out.cost.is_finite() && out.gradient.iter().all(|g| g.is_finite())).then_some(out)
     }
 }

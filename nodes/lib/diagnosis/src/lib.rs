@@ -49,11 +49,13 @@ mod pictures;
 mod place;
 mod plausible;
 mod posterior;
+mod predictive;
 mod priors;
 mod residual;
 mod sizes;
 mod state;
 mod stated;
+mod statement;
 #[cfg(test)]
 mod testing;
 mod trust;

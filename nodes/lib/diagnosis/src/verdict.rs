@@ -54,8 +54,9 @@ pub(crate) fn decide(budget: &Budget, inferred: &Inferred, library: &[EffectId])
         ));
     }
     // Something is there that has no name: what does nearly the same is not among the candidates.
-    let unnamed =
-        |e: &EffectId| inferred.statement(*e).is_some() && inferred.probability_here(*e) >= decisions::NAMED;
+    let unnamed = |e: &EffectId| {
+        inferred.statement(*e).is_some() && inferred.probability_of_alike(*e) >= decisions::NAMED
+    };
     let verdict = if !lacking.is_empty() || inferred.candidates().iter().any(unnamed) {
         Verdict::NoneOfThese
     } else if mean(&budget.nominal) - budget.retuned() > RETUNE_EXCESS {

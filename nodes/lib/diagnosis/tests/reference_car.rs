@@ -44,6 +44,22 @@ fn a_clear_effect_is_named_with_its_size_and_closes_the_gap() {
 }
 
 #[test]
+fn of_two_that_do_nearly_the_same_the_likelier_is_named_and_they_share_the_chance() {
+    /// What may be stated of an effect that nothing needs.
+    const NEEDLESS: f64 = 0.05;
+    let car = CarParameters::by_name("f1tenth").unwrap();
+    let vehicle = nominal(&car);
+    for (effect, rival) in [("steering_delay", "steering_lag"), ("steering_lag", "steering_delay")] {
+        // Few quick movements: hard to tell.
+        let recording = drive_at(&car, &[&format!("{effect}=0.04")], 0.6, DURATION_S, 31).unwrap();
+        let d = diagnose(&Request::new(&recording, &vehicle), &mut |_| {}).unwrap();
+        let chance = |name: &str| d.effects.iter().find(|e| e.name == name).map_or(0.0, |e| e.confidence);
+        assert_eq!(named(&d), [effect], "{}", text(&d));
+        assert!(chance(rival) <= (1.0 - chance(effect)).max(NEEDLESS), "{}", text(&d));
+    }
+}
+
+#[test]
 fn without_an_effect_nothing_is_named() {
     let recording = drive(&car(), &[], DURATION_S, 22).unwrap();
     let d = diagnosed(&recording, &[]);

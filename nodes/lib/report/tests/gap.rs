@@ -251,6 +251,17 @@ fn every_verdict_has_its_sentence() {
 }
 
 #[test]
+fn what_may_be_there_in_its_place_stands_beside_the_effect_named() {
+    let mut d = diagnosis();
+    d.effects[1].name = "steering_lag";
+    d.effects[1].confidence = 0.25;
+    let text = headline(&d);
+    assert!(text.contains("steering delay (delay 0.0470 s) or steering lag: 70 %"), "{text}");
+    d.effects[1].confidence = 0.05;
+    assert!(!headline(&d).contains("or steering lag"));
+}
+
+#[test]
 fn a_comparison_speaks_of_what_has_changed() {
     let mut d = diagnosis();
     for (verdict, words) in [

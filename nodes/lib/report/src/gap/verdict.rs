@@ -1,8 +1,8 @@
 //! The verdict as a sentence: the same at the head of the page and on the terminal.
 
-use gripsight_diagnosis::{Diagnosis, Verdict};
+use gripsight_diagnosis::{Diagnosis, RankedEffect, Verdict};
 
-use super::words::{closes, named};
+use super::words::{closes, named, words};
 use crate::page::Tone;
 use crate::text::significant;
 
@@ -12,6 +12,9 @@ const MOST: f64 = 0.5;
 const REMAINS: f64 = 2.0;
 /// Error with other tires over that with flexible terms up to which the tires do what can be done.
 const NEAR_CEILING: f64 = 1.5;
+
+/// Chance from which what may be there in an effect's place is worth a word in the verdict.
+const WORTH_A_WORD: f64 = 0.1;
 
 /// What a drive is compared with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,7 +55,8 @@ pub(super) fn sentence(d: &Diagnosis, before: Option<Before<'_>>) -> String {
     let remains = remains(d);
     match d.verdict {
         Verdict::Effects => {
-            let effects: Vec<String> = d.effects.iter().filter(|e| e.accepted).map(named).collect();
+            let effects: Vec<String> =
+                d.effects.iter().filter(|e| e.accepted).map(|e| or_else(d, e)).collect();
             let effects = enumerated(&effects);
             let closed = closed(d);
             if is_partial(d) {
@@ -99,6 +103,13 @@ pub(super) fn sentence(d: &Diagnosis, before: Option<Before<'_>>) -> String {
             None => "These data cannot tell.".into(),
         },
     }
+}
+
+/// An effect with its sizes, and what may be there in its place.
+fn or_else(d: &Diagnosis, effect: &RankedEffect) -> String {
+    let chance = |name: &str| d.effects.iter().find(|e| e.name == name).map_or(0.0, |e| e.confidence);
+    let others = effect.confused_with.iter().filter(|name| chance(name) >= WORTH_A_WORD);
+    std::iter::once(named(effect)).chain(others.map(|name| words(name))).collect::<Vec<_>>().join(" or ")
 }
 
 /// What the effects named close together.

@@ -1,0 +1,148 @@
+//! What is said of an effect: how likely it is a cause, and what shares that chance.
+
+use crate::decisions;
+
+/// An effect of the model that is left in the end.
+#[derive(Debug, Clone)]
+pub(crate) struct Statement {
+    pub(crate) term: usize,
+    /// Effects that do nearly the same and are not among the candidates.
+    pub(crate) untried: usize,
+    /// Effects that do nearly the same, by term, with the evidence of the model that has them in its place, over that of the model.
+    pub(crate) rivals: Vec<(usize, f64)>,
+    /// Logarithm of the predictive ratio of held-out data, with it over without it.
+    pub(crate) held_out_log_ratio: f64,
+    /// How many half widths of its interval its size is away from nothing.
+    pub(crate) size_over_half_width: f64,
+    /// Share of the error on data held out, noise included, that is left without it and that it closes.
+    pub(crate) closes: f64,
+    /// What it explains over what of the unnamed looks like it; infinite where nothing unnamed is needed.
+    pub(crate) over_unexplained: f64,
+}
+
+impl Statement {
+    /// Chance that the effect, or what does nearly the same, is a cause.
+    pub(crate) fn chance_of_alike(&self) -> f64 {
+        let signs = [self.closes, self.size_over_half_width];
+        let sign = |i: usize| {
+            let [unit, least] = [decisions::CHANCE_UNITS[i], decisions::CHANCE_LEAST[i]];
+            decisions::CHANCE[i + 1] * (signs[i].max(least) / unit).ln()
+        };
+        let log_odds = decisions::CHANCE[0] + (0..signs.len()).map(sign).sum::<f64>();
+        1.0 / (1.0 + (-log_odds).exp())
+    }
+
+    /// Chance that one of the candidates that do nearly the same is a cause: what is not among the candidates has its share.
+    pub(crate) fn chance_of_candidates(&self) -> f64 {
+        let tried = 1.0 + self.rivals.iter().map(|(_, ratio)| ratio).sum::<f64>();
+        self.chance_of_alike() * tried / (tried + self.untried as f64)
+    }
+
+    /// Chance that the effect is a cause.
+    pub(crate) fn chance(&self) -> f64 {
+        self.chance_of_alike() / self.sharers()
+    }
+
+    /// Chance that another candidate, by term, is the cause in its place.
+    pub(crate) fn chance_instead(&self, term: usize) -> f64 {
+        let ratio = self.rivals.iter().find(|(t, _)| *t == term).map_or(0.0, |(_, ratio)| *ratio);
+        self.chance() * ratio
+    }
+
+    /// What a chance is shared among: the effect, its rivals as they are likely, and what does nearly the same and nobody asked for, as likely as it.
+    fn sharers(&self) -> f64 {
+        1.0 + self.untried as f64 + self.rivals.iter().map(|(_, ratio)| ratio).sum::<f64>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows() -> Vec<(bool, Statement)> {
+        let path =
+            concat!(env!("CARGO_MANIFEST_DIR"), "/../../../tests/results/withheld/development_effects.csv");
+        let table = std::fs::read_to_string(path).unwrap();
+        let row = |line: &str| {
+            let cells: Vec<&str> = line.split(',').collect();
+            let number = |i: usize| cells[i].parse::<f64>().unwrap();
+            let [closes, size_over_half_width, over_unexplained] = [5, 6, 7].map(number);
+            let statement = Statement {
+                term: 0,
+                untried: 0,
+                rivals: Vec::new(),
+                held_out_log_ratio: 0.0,
+                size_over_half_width,
+                closes,
+                over_unexplained,
+            };
+            (cells[4] == "1", statement)
+        };
+        let counts = |(_, s): &(bool, Statement)| s.over_unexplained >= decisions::LEAST_OVER_UNEXPLAINED;
+        table.lines().skip(1).map(row).filter(counts).collect()
+    }
+
+    #[test]
+    fn the_chance_is_that_of_the_fit_to_the_development_effects() {
+        let rows = rows();
+        assert!(rows.len() > 100, "{}", rows.len());
+        let chances = || rows.iter().map(|(cause, s)| (f64::from(u8::from(*cause)), s.chance()));
+        // At the best fit as many are causes as the chances promise: overall, and among those that are named.
+        let (causes, promised) = chances().fold((0.0, 0.0), |sum, (c, p)| (sum.0 + c, sum.1 + p));
+        assert!((causes - promised).abs() < 0.03 * causes, "{causes} causes, {promised} promised");
+        let loss = -chances().map(|(c, p)| (c * p + (1.0 - c) * (1.0 - p)).ln()).sum::<f64>();
+        let share = causes / rows.len() as f64;
+        let constant = -(causes * share.ln() + (rows.len() as f64 - causes) * (1.0 - share).ln());
+        assert!(loss < 0.75 * constant, "log loss {loss}, that of a constant {constant}");
+    }
+
+    #[test]
+    fn each_sign_raises_the_chance() {
+        let weak = Statement {
+            term: 0,
+            untried: 0,
+            rivals: Vec::new(),
+            held_out_log_ratio: 0.0,
+            size_over_half_width: 0.7,
+            closes: 0.01,
+            over_unexplained: 0.1,
+        };
+        assert!(weak.chance() < 0.1, "{}", weak.chance());
+        let strong = Statement {
+            size_over_half_width: 8.0,
+            closes: 0.5,
+            over_unexplained: f64::INFINITY,
+            ..weak.clone()
+        };
+        assert!(strong.chance() > 0.8, "{}", strong.chance());
+        for less in [
+            Statement { size_over_half_width: 1.0, ..strong.clone() },
+            Statement { closes: 0.001, ..strong.clone() },
+            Statement { untried: 1, ..strong.clone() },
+        ] {
+            assert!(less.chance() < strong.chance());
+        }
+    }
+
+    #[test]
+    fn a_chance_is_shared_with_what_does_as_well() {
+        let alone = Statement {
+            term: 3,
+            untried: 0,
+            rivals: Vec::new(),
+            held_out_log_ratio: 50.0,
+            size_over_half_width: 8.0,
+            closes: 0.5,
+            over_unexplained: f64::INFINITY,
+        };
+        let beside = Statement { rivals: vec![(4, 1.0), (5, 0.5)], ..alone.clone() };
+        let whole = alone.chance();
+        assert!((beside.chance() - whole / 2.5).abs() < 1e-12);
+        assert!((beside.chance_instead(5) - whole / 5.0).abs() < 1e-12);
+        assert!(beside.chance_instead(6) == 0.0);
+        // One of the candidates it is; where nobody asked for another that does the same, less surely.
+        assert!((beside.chance_of_candidates() - whole).abs() < 1e-12);
+        let unasked = Statement { untried: 1, ..beside };
+        assert!((unasked.chance_of_candidates() - whole * 2.5 / 3.5).abs() < 1e-12);
+    }
+}
