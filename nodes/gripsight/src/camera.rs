@@ -157,20 +157,28 @@ fn choose_topic(bag: &Bag, args: &CameraArgs) -> anyhow::Result<String> {
     Ok((*most).to_owned())
 }
 
-/// The mean of what the bag's pictures say, each at the distance that the odometry had by then.
-pub(crate) fn prior_of_bag(
-    path: &Path,
+/// The mean of what the pictures of some bags say, each at the distance that the odometry had by then. A bag without pictures adds nothing.
+pub(crate) fn prior_of_bags(
+    paths: &[PathBuf],
     topics: &TopicMap,
     args: &CameraArgs,
 ) -> anyhow::Result<FrictionPrior> {
     let mut estimator = args.estimator()?;
     let mut seen = Seen::default();
-    each_picture(path, topics, args, |shot| {
-        let frame = Frame { stamp_ns: shot.stamp_ns, data: shot.data };
-        seen.take(&estimator.update(&frame, shot.stamp_ns, &shot.motion));
-        Ok(())
-    })?;
-    seen.mean().with_context(|| format!("{}: no picture tells the friction", path.display()))
+    for path in paths {
+        estimator.reset();
+        let read = each_picture(path, topics, args, |shot| {
+            let frame = Frame { stamp_ns: shot.stamp_ns, data: shot.data };
+            seen.take(&estimator.update(&frame, shot.stamp_ns, &shot.motion));
+            Ok(())
+        });
+        match read {
+            Err(error) if paths.len() > 1 => tracing::warn!("{error:#}"),
+            other => drop(other?),
+        }
+    }
+    let names = paths.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", ");
+    seen.mean().with_context(|| format!("{names}: no picture tells the friction"))
 }
 
 /// Sums over pictures.

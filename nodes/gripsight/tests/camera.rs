@@ -31,6 +31,14 @@ fn readings(bag: &str, more: &[&str]) -> (f64, bool) {
     (mu[mu.len() / 2], 2 * new > valid.len())
 }
 
+/// A drive on the same floor without a camera.
+fn simulate_without(bag: &str) -> String {
+    let drive = ["--mu", "0.45", "--track", "bean", "--realistic", "--duration", "15", "--out", bag];
+    let (code, _, log) = gripsight(&[&["simulate"][..], &drive].concat());
+    assert_eq!(code, Some(0), "{log}");
+    bag.to_owned()
+}
+
 #[test]
 fn a_floor_that_lies_is_found_out_by_the_drives_on_it() {
     if gripsight_friction::find_library(None, Path::new(env!("CARGO_MANIFEST_DIR"))).is_err() {
@@ -72,6 +80,13 @@ fn a_floor_that_lies_is_found_out_by_the_drives_on_it() {
     let (code, said, log) = gripsight(&both);
     assert_eq!(code, Some(0), "{log}");
     assert!(said.contains("pictures"), "{said}");
+    // Pictures of any of several bags make the prior.
+    let (vehicle, out) = (at("first.vehicle.yaml"), at("both_result"));
+    let dark = simulate_without(&at("dark.mcap"));
+    let bags = ["identify", &dark, &second, "--camera", "--calibration", &learned];
+    let (_, _, log) =
+        gripsight(&[&bags[..], &["--vehicle", &vehicle, "--residual", "none", "--out", &out]].concat());
+    assert!(log.contains("friction prior 0.4") && !log.contains("no friction prior"), "{log}");
     let (before, _) = readings(&second, &[]);
     let (after, new) = readings(&second, &["--calibration", &learned]);
     // The tires find 0.42 there: 0.45 less what load transfer takes.

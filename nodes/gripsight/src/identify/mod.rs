@@ -25,7 +25,7 @@ use gripsight_signals::{StateSequence, WindowConfig};
 use gripsight_vehicle::VehicleParameters;
 
 use crate::Outcome;
-use crate::camera::{CameraArgs, prior_of_bag};
+use crate::camera::{CameraArgs, prior_of_bags};
 use crate::data::{notes as signal_notes, with_checks};
 use crate::diagnose::extended_model;
 use crate::invocation::{file_name, invocation};
@@ -68,7 +68,7 @@ pub(crate) struct IdentifyArgs {
     /// Standard deviation of that belief.
     #[arg(long, value_name = "SIGMA", default_value_t = 0.1, requires = "prior_mu", value_parser = positive)]
     prior_sigma: f64,
-    /// Take that belief from the bag's camera pictures.
+    /// Take that belief from the camera pictures of the bags.
     #[arg(long)]
     camera: bool,
     /// How tires are found: as the paper does, or the most robust way known.
@@ -166,7 +166,7 @@ impl IdentifyArgs {
 
     fn prior(&self, topics: &TopicMap) -> anyhow::Result<Option<FrictionPrior>> {
         if self.camera {
-            return Ok(match prior_of_bag(self.bag(), topics, &self.pictures) {
+            return Ok(match prior_of_bags(&self.bags, topics, &self.pictures) {
                 Ok(prior) => Some(prior),
                 // The data alone are judged first: a prior is one set more, and its lack is no reason to lose the other.
                 Err(error) => {
