@@ -20,6 +20,8 @@ pub(crate) struct Laps {
     station_m: Option<f64>,
     /// When the lap began; none until the line was crossed or the car stood on it.
     began_s: Option<f64>,
+    /// Half way round since: a car that stands on the line crosses it by its odometry's noise alone.
+    half_way: bool,
     number: u32,
     sum_m: f64,
     looks: u32,
@@ -41,6 +43,7 @@ impl Laps {
         self.sum_m += place.offset_m.abs();
         self.looks += 1;
         self.worst_m = self.worst_m.max(place.offset_m.abs());
+        self.half_way |= (0.4..0.6).contains(&(place.station_m / length_m));
         let Some(before_m) = before_m else {
             // A car that starts on the line begins its lap there.
             self.began_s = (place.station_m < 0.02 * length_m).then_some(stamp_s);
@@ -49,7 +52,7 @@ impl Laps {
         if !(before_m > 0.75 * length_m && place.station_m < 0.25 * length_m) {
             return None;
         }
-        let lap = self.began_s.map(|began_s| Lap {
+        let lap = self.began_s.filter(|_| self.half_way).map(|began_s| Lap {
             number: self.number + 1,
             time_s: stamp_s - began_s,
             mean_m: self.sum_m / f64::from(self.looks.max(1)),
@@ -95,6 +98,13 @@ mod tests {
         // 215 m from station 30 m of a lap of 62.8 m: the line three times, so two whole laps.
         assert_eq!(driven.iter().map(|l| (l.number, l.exits)).collect::<Vec<_>>(), [(1, 0), (2, 1)]);
         assert!((driven[0].time_s - 12.57).abs() < 0.2 && driven[1].worst_m == 0.6, "{driven:?}");
+        // A car that stands on the line for a while, and sets off.
+        let mut laps = Laps::default();
+        let noisy = (0..20).map(|k| if k % 2 == 0 { 0.01 } else { track.length_m() - 0.01 });
+        let along = noisy.chain((0..140).map(|k| f64::from(k) * 0.5 % track.length_m()));
+        let pass = |(k, station_m)| laps.pass(k as f64 * 0.1, Place { station_m, offset_m: 0.1 }, &track);
+        let driven: Vec<Lap> = along.enumerate().filter_map(pass).collect();
+        assert!(driven.len() == 1 && (driven[0].time_s - 12.6).abs() < 0.3, "{driven:?}");
         let out = Laps::outside_m(Place { station_m: 3.0, offset_m: -0.7 }, &track).unwrap();
         assert!((out - 0.2).abs() < 1e-9);
     }

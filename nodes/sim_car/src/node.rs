@@ -53,6 +53,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
     };
     let car = LiveCar {
         simulation: Simulation::new(settings.scenario.clone())?,
+        floor: settings.mu.get(),
         settings,
         outputs,
         diagnostics: node.diagnostics(),
@@ -78,6 +79,8 @@ struct Outputs {
 
 struct LiveCar {
     simulation: Simulation,
+    /// Friction of the road under it.
+    floor: f64,
     settings: Settings,
     outputs: Outputs,
     diagnostics: Diagnostics,
@@ -91,6 +94,8 @@ impl LiveCar {
         mut commands: Option<Subscription<AckermannDriveStamped>>,
     ) -> anyhow::Result<()> {
         if self.settings.wheel == Wheel::Topic {
+            // Nobody knows yet where it should go.
+            self.simulation.put(0.0, 0.0, 0.0);
             self.simulation.command(Command::default());
         }
         let mut ticks = tokio::time::interval(PERIOD);
@@ -107,6 +112,7 @@ impl LiveCar {
             let now = Instant::now();
             due_s += (now - last).as_secs_f64() * self.settings.rate.get();
             last = now;
+            self.change_floor();
             let end = self.catch_up(due_s, now);
             self.state.lag_s = due_s - self.simulation.time_s();
             if self.state.lag_s > LAG_GIVEN_UP_S {
@@ -121,6 +127,18 @@ impl LiveCar {
             if let Err(reason) = end {
                 bail!("{reason}");
             }
+        }
+    }
+
+    /// Lays the floor that the parameter asks for.
+    fn change_floor(&mut self) {
+        let mu = self.settings.mu.get();
+        if mu != self.floor {
+            match self.simulation.set_friction(mu) {
+                Ok(()) => tracing::info!("the floor changes from {} to {mu}", self.floor),
+                Err(error) => tracing::warn!("{error}"),
+            }
+            self.floor = mu;
         }
     }
 

@@ -27,6 +27,8 @@ pub(crate) struct Settings {
     pub(crate) wheel: Wheel,
     /// Seconds of the car per second.
     pub(crate) rate: Parameter<f64>,
+    /// Friction of the road.
+    pub(crate) mu: Parameter<f64>,
     pub(crate) publish_clock: bool,
     /// Age from which a drive command no longer counts.
     pub(crate) command_timeout_s: f64,
@@ -67,7 +69,6 @@ impl Settings {
             node.parameter(name, default, Descriptor::new(meaning).range(low..=high).read_only())
                 .map(|p| p.get())
         };
-        let mu = number("mu", 0.9, 0.01, 3.0, "Friction of the road")?;
         let pace = number("pace", 0.8, 0.05, 2.0, "Share of the grip that the own driver plans to use")?;
         let noise = number("noise", 1.0, 0.0, 100.0, "Sensor noise over its usual size")?;
         let camera_rate_hz =
@@ -89,6 +90,10 @@ impl Settings {
             1.0,
             Descriptor::new("Seconds of the car per second").range(0.01..=100.0),
         )?;
+
+        let friction =
+            node.parameter("mu", 0.9, Descriptor::new("Friction of the road").range(0.01..=3.0))?;
+        let mu = friction.get();
 
         let car = CarParameters::by_name(&car)?;
         let course = Course::by_name(&track, &car, reverse)?;
@@ -115,7 +120,8 @@ impl Settings {
         scenario.effects.extend(asked);
         let mut sensors = scenario.sensors.scaled(noise);
         sensors.camera_rate_hz = camera_rate_hz;
-        Ok(Self { scenario: scenario.sensors(sensors), wheel, rate, publish_clock, command_timeout_s })
+        let scenario = scenario.sensors(sensors);
+        Ok(Self { scenario, wheel, rate, mu: friction, publish_clock, command_timeout_s })
     }
 }
 

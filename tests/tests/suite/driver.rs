@@ -31,6 +31,17 @@ fn publish(domain: &Domain, python: &Path, hash: &str, status: u8) {
     assert!(peer.wait(PATIENCE).success());
 }
 
+/// Says that six tenths are left of what a set promises.
+fn warn(domain: &Domain, python: &Path, hash: &str, sequence: u64) {
+    let grip = json!({
+        "handshake": {"vehicle_hash": hash, "sequence_id": sequence}, "fallen": true, "share": 0.6, "text": "as a peer says"
+    });
+    let kind = "gripsight_msgs/msg/Grip";
+    let mut peer = start_cyclone(domain, python, &["publish", "/identifier/grip", kind, "--qos", "latched"]);
+    peer.feed(&grip.to_string());
+    assert!(peer.wait(PATIENCE).success());
+}
+
 #[test]
 fn the_driver_laps_the_live_car_takes_a_set_and_slows_when_it_is_withdrawn() {
     let cyclone = cyclone();
@@ -59,7 +70,7 @@ fn the_driver_laps_the_live_car_takes_a_set_and_slows_when_it_is_withdrawn() {
             "grip:=identifier/grip",
         ],
     );
-    // The car rolls straight on until the first command reaches it: that lap shows nothing.
+    // The car stands until the first command reaches it: that lap shows nothing.
     lap(&driver);
     let slow = lap(&driver);
     assert_eq!(slow.exits, 0, "off the track on the start's tires");
@@ -74,6 +85,13 @@ fn the_driver_laps_the_live_car_takes_a_set_and_slows_when_it_is_withdrawn() {
     let fast = lap(&driver);
     assert!(fast.time_s < 0.9 * slow.time_s, "{} s after {} s", fast.time_s, slow.time_s);
     assert_eq!(fast.exits, 0, "off the track on its own tires");
+
+    let told = Instant::now();
+    warn(&domain, &python, &hash, 6);
+    driver.wait_for_log("planning with a grip of 0.47", PATIENCE);
+    assert!(told.elapsed() < Duration::from_secs(3), "{:?} with the peer's own start", told.elapsed());
+    publish(&domain, &python, &hash, PacejkaParams::ACCEPTED);
+    driver.wait_for_log("Accepted: planning with a grip of 0.8", PATIENCE);
 
     let told = Instant::now();
     publish(&domain, &python, &hash, PacejkaParams::WITHDRAWN);

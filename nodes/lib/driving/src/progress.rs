@@ -5,6 +5,9 @@ use crate::Place;
 /// Share of a half lap that a plan must have been in force for to count as driven.
 const COUNTS: f64 = 0.8;
 
+/// Part of a half lap: a whole number of them, divided again, may be a little less.
+const ROUNDING: f64 = 1e-6;
+
 /// Distance driven along the line, in half laps: each has corners of all kinds.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Progress {
@@ -48,7 +51,7 @@ impl Progress {
         let along_m = before_m + step_m - length_m * (step_m / length_m).round();
         self.along_m = Some(along_m);
         // The first half lap counts from where the car stood.
-        let end_m = ((self.began_m / self.half_m).floor() + 1.0) * self.half_m;
+        let end_m = ((self.began_m / self.half_m + ROUNDING).floor() + 1.0) * self.half_m;
         if along_m < end_m {
             return None;
         }
@@ -77,6 +80,19 @@ mod tests {
         assert_eq!(progress.halves(), 3, "the line itself is a half lap's end");
         let mut late = Progress::new(100.0, 0.5);
         assert_eq!(drive(&mut late, 40.0, 130.0, 0.5), [0.5]);
+    }
+
+    #[test]
+    fn no_half_lap_counts_twice_however_long_it_is() {
+        for tenths in 600..900_i32 {
+            let length_m = f64::from(tenths) * 0.1;
+            let mut progress = Progress::new(length_m, 0.5);
+            for k in 0..=1200_i32 {
+                let station_m = (f64::from(k) * 0.01).fract() * length_m;
+                progress.pass(Place { station_m, offset_m: 0.0 }, 0.5);
+            }
+            assert!((23..=24).contains(&progress.halves()), "{} of {length_m} m", progress.halves());
+        }
     }
 
     #[test]

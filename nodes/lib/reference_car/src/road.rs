@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::car::CarParameters;
+use crate::error::ReferenceCarError;
 use crate::mechanisms::{Mechanisms, Patch};
 use crate::plant_state::Surroundings;
 use crate::scenario::{Friction, Scenario};
@@ -47,6 +48,14 @@ impl Road {
             gusts: [0.0; 2],
             random: ChaCha8Rng::seed_from_u64(scenario.seed ^ 0x6057_0a12),
         }
+    }
+
+    /// Another friction of the road from now on.
+    pub(crate) fn set_friction(&mut self, mu: f64) -> Result<(), ReferenceCarError> {
+        let friction = Friction::Uniform { mu };
+        friction.validate()?;
+        self.friction = friction;
+        Ok(())
     }
 
     /// What acts on a car at a station, turned by `turn_rad` against the track.

@@ -152,7 +152,7 @@ impl Friction {
         }
     }
 
-    fn validate(&self) -> Result<(), ReferenceCarError> {
+    pub(crate) fn validate(&self) -> Result<(), ReferenceCarError> {
         positive("friction.mu", self.nominal())?;
         match self {
             Self::Uniform { .. } => Ok(()),

@@ -201,6 +201,14 @@ impl Simulation {
         self.place = other.place;
     }
 
+    /// The road's friction from now on, everywhere and at once, as when rain sets in; patches keep their share.
+    ///
+    /// # Errors
+    /// `InvalidParameter` for a friction that is not above zero.
+    pub fn set_friction(&mut self, mu: f64) -> Result<(), ReferenceCarError> {
+        self.road.set_friction(mu)
+    }
+
     /// Puts the car into a motion where it is; actuators, springs and tires stay as they are, and wheels go on rolling with the slip they had.
     pub fn put(&mut self, v_x_mps: f64, v_y_mps: f64, yaw_rate_radps: f64) {
         let s = &mut self.state;

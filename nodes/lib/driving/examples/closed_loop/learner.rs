@@ -38,6 +38,11 @@ impl Learner {
         }
     }
 
+    /// The prior sees another floor.
+    pub(crate) fn look_again(&mut self, prior: Option<FrictionPrior>) {
+        self.prior = prior;
+    }
+
     pub(crate) fn push(&mut self, sample: &SensorSample, driver: &mut Driver) -> Result<()> {
         self.aligner.push(sample.measurement(1_000_000_000))?;
         while let Some(aligned) = self.aligner.poll() {

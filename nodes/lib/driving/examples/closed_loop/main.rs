@@ -3,31 +3,44 @@
 //! `launch_scripts/closed_loop.sh OUT [--quick]` runs it. In process, many times real time; the driver sees the noisy odometry, the identification
 //! the noisy telemetry, and only the referee the truth.
 
+mod changes;
+mod drive;
 mod learner;
 mod plant;
+mod referee;
 mod run;
+mod store;
 mod table;
 
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Result, ensure};
-use clap::Parser;
+use clap::{Parser, ValueEnum};
 use gripsight_reference_car::CarParameters;
-use rayon::prelude::*;
 use run::{Case, Variant, drive};
-use table::Laps;
+use store::Store;
+
+/// What is driven for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Experiment {
+    /// Laps from mu = 0.51 on an unknown road: laps.csv
+    Laps,
+    /// The floor changes in the middle of the run: changes.csv
+    Changes,
+}
 
 /// Drives the reference car from mu = 0.51 on roads that it does not know, with and without identification.
 #[derive(Debug, Parser)]
 #[command(
     name = "closed_loop",
-    after_help = "Examples:\n  closed_loop out --quick\n  closed_loop out --cars f1tenth --tracks club,oval --frictions 0.6,0.9 --seeds 3\n  closed_loop out --quick --verbose"
+    after_help = "Examples:\n  closed_loop out --quick\n  closed_loop out --cars f1tenth --tracks club,oval --frictions 0.6,0.9 --seeds 3\n  closed_loop out --experiment changes --cars f1tenth --seeds 12"
 )]
 struct Arguments {
-    /// Folder for laps.csv and summary.md; what laps.csv holds already is not driven again
+    /// Folder for the rows and summary.md; what the rows hold already is not driven again
     out: PathBuf,
+    /// What is driven for
+    #[arg(long, value_enum, default_value = "laps")]
+    experiment: Experiment,
     /// One track, one friction, the 1:10 car, two seeds
     #[arg(long)]
     quick: bool,
@@ -37,7 +50,7 @@ struct Arguments {
     /// Tracks
     #[arg(long, value_delimiter = ',', default_value = "harbor,valley,quarry,delta,lagoon")]
     tracks: Vec<String>,
-    /// Frictions of the road
+    /// Frictions of the road, for laps
     #[arg(long, value_delimiter = ',', default_value = "0.4,0.65,0.9")]
     frictions: Vec<f64>,
     /// Seeds of each, from 1
@@ -49,12 +62,34 @@ struct Arguments {
     /// Variants; all without
     #[arg(long, value_delimiter = ',')]
     variants: Vec<String>,
-    /// Laps of a run
+    /// Laps of a run, for laps
     #[arg(long, default_value_t = 5)]
     laps: usize,
     /// Says on standard error what happens in each run; one after the other
     #[arg(long)]
     verbose: bool,
+}
+
+impl Arguments {
+    /// Whether a variant was asked for.
+    fn asks_for(&self, name: &str) -> bool {
+        self.variants.is_empty() || self.variants.iter().any(|asked| asked == name)
+    }
+
+    fn check(&self, known: &[&str]) -> Result<()> {
+        for name in &self.variants {
+            ensure!(
+                known.contains(&name.as_str()),
+                "no variant is called {name:?}; known: {}",
+                known.join(", ")
+            );
+        }
+        Ok(())
+    }
+
+    fn seeds(&self) -> impl Iterator<Item = u64> + use<> {
+        self.from_seed..self.from_seed + self.seeds
+    }
 }
 
 fn main() -> Result<()> {
@@ -65,10 +100,19 @@ fn main() -> Result<()> {
         arguments.frictions = vec![0.9];
         arguments.seeds = arguments.seeds.min(2);
     }
-    for name in &arguments.variants {
-        let known = Variant::ALL.map(Variant::name);
-        ensure!(known.contains(&name.as_str()), "no variant is called {name:?}; known: {}", known.join(", "));
-    }
+    std::fs::create_dir_all(&arguments.out)?;
+    let summary = match arguments.experiment {
+        Experiment::Laps => laps(&arguments)?,
+        Experiment::Changes => changes::experiment(&arguments)?,
+    };
+    std::fs::write(arguments.out.join("summary.md"), &summary)?;
+    print!("{summary}");
+    Ok(())
+}
+
+/// Laps on an unknown road, by variant.
+fn laps(arguments: &Arguments) -> Result<String> {
+    arguments.check(&Variant::ALL.map(Variant::name))?;
     let mut work = Vec::new();
     for car in &arguments.cars {
         let car = CarParameters::by_name(car)?;
@@ -78,45 +122,24 @@ fn main() -> Result<()> {
                 eprintln!("{} on {mu}: {tires:?}", car.name);
             }
             for track in &arguments.tracks {
-                for seed in arguments.from_seed..arguments.from_seed + arguments.seeds {
+                for seed in arguments.seeds() {
                     let (car, track, laps) = (car.clone(), track.clone(), arguments.laps);
                     let case = Case { car, track, mu, seed, laps, tires };
-                    let asked = |v: &Variant| {
-                        arguments.variants.is_empty() || arguments.variants.iter().any(|n| n == v.name())
-                    };
-                    work.extend(
-                        Variant::ALL.into_iter().filter(asked).map(|variant| (case.clone(), variant)),
-                    );
+                    let asked = Variant::ALL.into_iter().filter(|v| arguments.asks_for(v.name()));
+                    work.extend(asked.map(|variant| (case.clone(), variant)));
                 }
             }
         }
     }
-    std::fs::create_dir_all(&arguments.out)?;
-    let laps = Laps::open(&arguments.out.join("laps.csv"))?;
-    work.retain(|(case, variant)| !laps.rows.iter().any(|row| row.is_of(case, *variant)));
-    let (count, done, laps) = (work.len(), AtomicUsize::new(0), Mutex::new(laps));
-    let one = |(case, variant): (Case, Variant)| -> Result<()> {
+    let store = Store::<table::Row>::open(&arguments.out.join("laps.csv"))?;
+    work.retain(|(case, variant)| !store.rows.iter().any(|row| row.is_of(case, *variant)));
+    let rows = store.fill(work, arguments.verbose, |(case, variant)| {
         if arguments.verbose {
             eprintln!("{} {} {} seed {} {}", case.car.name, case.track, case.mu, case.seed, variant.name());
         }
         let begin = std::time::Instant::now();
         let run = drive(&case, variant, arguments.verbose)?;
-        let rows = table::rows(&case, variant, &run, begin.elapsed().as_secs_f64());
-        laps.lock().unwrap_or_else(PoisonError::into_inner).add(rows)?;
-        let number = done.fetch_add(1, Ordering::Relaxed) + 1;
-        if number.is_multiple_of(10) || number == count {
-            eprintln!("{number} of {count} runs");
-        }
-        Ok(())
-    };
-    if arguments.verbose {
-        work.into_iter().try_for_each(one)?;
-    } else {
-        work.into_par_iter().try_for_each(one)?;
-    }
-    let laps = laps.into_inner().unwrap_or_else(PoisonError::into_inner);
-    let summary = table::summary(&laps.rows);
-    std::fs::write(arguments.out.join("summary.md"), &summary)?;
-    print!("{summary}");
-    Ok(())
+        Ok(table::rows(&case, variant, &run, begin.elapsed().as_secs_f64()))
+    })?;
+    Ok(table::summary(&rows))
 }

@@ -1,14 +1,12 @@
-//! The tables of what was driven: laps.csv, which grows run by run, and the summary of its rows.
+//! The table of laps, and the summary of its rows.
 
 use std::fmt::Write as _;
-use std::fs::{File, OpenOptions};
-use std::io::Write as _;
-use std::path::Path;
 
-use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 
-use crate::run::{Case, Lap, Run, Variant};
+use crate::referee::Lap;
+use crate::run::{Case, Run, Variant};
+use crate::store::{mean, median, parts};
 
 /// Behind the true tires by no more than this: converged.
 const CONVERGED: f64 = 0.03;
@@ -53,75 +51,20 @@ pub(crate) fn rows(case: &Case, variant: Variant, run: &Run, seconds: f64) -> Ve
         seed: case.seed,
         variant: variant.name().to_owned(),
         lap: number,
-        time_s: thousandths(lap.time_s, 1e3),
-        error_m: thousandths(lap.error_m, 1e4),
-        worst_m: thousandths(lap.worst_m, 1e4),
-        used: thousandths(lap.used, 1e4),
+        time_s: parts(lap.time_s, 1e3),
+        error_m: parts(lap.error_m, 1e4),
+        worst_m: parts(lap.worst_m, 1e4),
+        used: parts(lap.used, 1e4),
         exits: lap.exits,
-        planned_grip: thousandths(lap.planned, 1e4),
+        planned_grip: parts(lap.planned, 1e4),
         set: lap.trust.map_or(String::new(), |t| format!("{t:?}")),
         wreck: if number == run.laps.len() { run.wreck.unwrap_or("").to_owned() } else { String::new() },
-        run_seconds: thousandths(seconds, 1e2),
+        run_seconds: parts(seconds, 1e2),
     };
     if run.laps.is_empty() {
         return vec![row(0, &Lap { time_s: f64::NAN, ..Lap::default() })];
     }
     run.laps.iter().enumerate().map(|(k, lap)| row(k + 1, lap)).collect()
-}
-
-/// To so many parts of one.
-fn thousandths(value: f64, parts: f64) -> f64 {
-    (value * parts).round() / parts
-}
-
-/// laps.csv: what it holds already counts as driven, and each run is added when it ends.
-pub(crate) struct Laps {
-    file: File,
-    pub(crate) rows: Vec<Row>,
-    empty: bool,
-}
-
-impl Laps {
-    pub(crate) fn open(path: &Path) -> Result<Self> {
-        let context = || format!("file {}", path.display());
-        let rows = if path.exists() {
-            csv::Reader::from_path(path)?
-                .deserialize()
-                .collect::<Result<Vec<Row>, _>>()
-                .with_context(context)?
-        } else {
-            Vec::new()
-        };
-        let file = OpenOptions::new().create(true).append(true).open(path).with_context(context)?;
-        Ok(Self { empty: file.metadata()?.len() == 0, file, rows })
-    }
-
-    pub(crate) fn add(&mut self, rows: Vec<Row>) -> Result<()> {
-        let mut writer = csv::WriterBuilder::new().has_headers(self.empty).from_writer(Vec::new());
-        for row in &rows {
-            writer.serialize(row)?;
-        }
-        // One write a run: what ends in the middle leaves no half of one.
-        self.file.write_all(&writer.into_inner()?)?;
-        self.empty = false;
-        self.rows.extend(rows);
-        Ok(())
-    }
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.retain(|v| v.is_finite());
-    values.sort_by(f64::total_cmp);
-    if values.is_empty() {
-        f64::NAN
-    } else {
-        0.5 * (values[(values.len() - 1) / 2] + values[values.len() / 2])
-    }
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
-    if count > 0.0 { sum / count } else { f64::NAN }
 }
 
 /// The laps of one run.

@@ -306,3 +306,18 @@ fn absurd_parameters_are_refused_or_end_with_a_reason() {
     let recording = Simulation::new(extreme).unwrap().run(|_| {});
     assert!(recording.truth.iter().all(|t| t.motion.v_y_mps.is_finite() && t.motion.x_m.is_finite()));
 }
+
+#[test]
+fn a_floor_that_changes_takes_hold_at_once_and_everywhere() {
+    let course = Course::by_name("club", &car("f1tenth"), false).unwrap();
+    let mut run = Simulation::new(exact("f1tenth", course, 60.0)).unwrap();
+    let drive = |run: &mut Simulation, seconds: usize| {
+        (0..1000 * seconds).try_for_each(|_| run.drive()).map(|()| *run.now().unwrap())
+    };
+    assert!(drive(&mut run, 2).unwrap().wheels.iter().all(|w| w.road_friction == 0.9));
+    assert!(run.set_friction(0.0).is_err() && run.set_friction(f64::NAN).is_err());
+    run.set_friction(0.2).unwrap();
+    // The scenario's driver goes on as on the old floor.
+    assert!(drive(&mut run, 20).is_err(), "a corner at 80 % of 0.9 is driven through at 0.2");
+    assert!(run.now().unwrap().wheels.iter().all(|w| w.road_friction == 0.2));
+}

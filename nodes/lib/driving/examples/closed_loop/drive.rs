@@ -1,0 +1,111 @@
+//! The loop itself: plant, driver, referee and what is learnt, look by look.
+
+use anyhow::{Context, Result};
+use gripsight_driving::{CarState, Driver, Drivetrain, Limits, Settings, TireSet, Trust};
+use gripsight_reference_car::{Command, Course, EffectSetting, SensorSample, Simulation};
+use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
+
+use crate::learner::Learner;
+use crate::plant;
+use crate::referee::Referee;
+use crate::run::Case;
+
+/// Looks at the truth a second.
+const LOOKS_HZ: u64 = 100;
+
+/// A car being driven.
+pub(crate) struct Loop {
+    pub(crate) sim: Simulation,
+    pub(crate) driver: Driver,
+    pub(crate) referee: Referee,
+    pub(crate) learner: Option<Learner>,
+    pub(crate) vehicle: VehicleParameters,
+    drivetrain: Drivetrain,
+    steps: u64,
+    halves: usize,
+    verbose: bool,
+}
+
+/// A set that the plant itself stands for.
+pub(crate) fn truth(tires: PacejkaParameters) -> TireSet {
+    TireSet { trust: Trust::Accepted, ..TireSet::assumed(tires) }
+}
+
+impl Loop {
+    /// At the line, rolling at a speed that any of these roads allows.
+    pub(crate) fn new(case: &Case, start: TireSet, effects: &[EffectSetting], verbose: bool) -> Result<Self> {
+        let reversed = case.seed % 2 == 1;
+        let vehicle = plant::vehicle(&case.car)?;
+        let drivetrain = plant::drivetrain(&case.car);
+        let track = plant::track(&case.car, &case.track, reversed)?;
+        let limits = Limits::new(&vehicle, truth(case.tires).grip(), &drivetrain);
+        let driver = Driver::new(vehicle.clone(), drivetrain, track.clone(), start, Settings::default())?;
+        let course = Course::Track { name: case.track.clone(), reversed };
+        let mut scenario = plant::scenario(&case.car, course, case.mu, case.seed);
+        scenario.driver.pace = (0.25 / case.mu).min(1.0);
+        scenario.effects.extend(effects.iter().cloned());
+        let sim = Simulation::new(scenario)?;
+        let referee = Referee::new(track, &limits, sim.track().context("no track")?.half_width_m());
+        Ok(Self { sim, driver, referee, learner: None, vehicle, drivetrain, steps: 0, halves: 0, verbose })
+    }
+
+    /// The road changes, everywhere and at once; `tires` are the plant's on it.
+    pub(crate) fn change_floor(&mut self, mu: f64, tires: PacejkaParameters) -> Result<()> {
+        self.sim.set_friction(mu)?;
+        self.referee.floor(&Limits::new(&self.vehicle, truth(tires).grip(), &self.drivetrain));
+        Ok(())
+    }
+
+    /// Drives until the next look; the reason for which the run cannot go on.
+    pub(crate) fn look(&mut self) -> Result<Option<&'static str>> {
+        for _ in 0..1000 / LOOKS_HZ {
+            if self.sim.step().is_err() {
+                return Ok(Some("rollover"));
+            }
+            self.steps += 1;
+            for sample in self.sim.drain().0 {
+                if let Some(learner) = &mut self.learner {
+                    learner.push(&sample, &mut self.driver)?;
+                }
+                if let SensorSample::Odometry(s) = sample {
+                    let state = CarState {
+                        stamp_s: s.stamp_s,
+                        x_m: s.x_m,
+                        y_m: s.y_m,
+                        heading_rad: s.heading_rad,
+                        v_x_mps: s.v_x_mps,
+                        v_y_mps: s.v_y_mps,
+                        yaw_rate_radps: s.yaw_rate_radps,
+                    };
+                    let command = self.driver.command(&state, s.stamp_s);
+                    self.sim.command(Command {
+                        steering_rad: command.steering_rad,
+                        speed_mps: command.speed_mps,
+                        acceleration_mps2: Some(command.acceleration_mps2),
+                    });
+                }
+            }
+        }
+        let Some(now) = self.sim.now() else { return Ok(None) };
+        if let Some(reason) = self.referee.look(now, &self.driver) {
+            return Ok(Some(reason));
+        }
+        if self.driver.halves() > self.halves {
+            self.halves = self.driver.halves();
+            if let Some(learner) = &mut self.learner {
+                learner.identify(&mut self.driver, self.verbose)?;
+            }
+            if self.verbose {
+                eprintln!(
+                    "  {:.1} s, half lap {}: planned {:.3} {}{}",
+                    self.sim.time_s(),
+                    self.halves,
+                    self.driver.grip(),
+                    if self.driver.held_back() { "held back " } else { "" },
+                    self.referee.laps.last().map_or(String::new(), |l| format!("last lap {:.2} s", l.time_s)),
+                );
+            }
+        }
+        Ok(None)
+    }
+}

@@ -1,0 +1,120 @@
+//! The referee: times laps and counts exits by the truth.
+
+use gripsight_driving::{Driver, Limits, SpeedProfile, Track, Trust};
+use gripsight_reference_car::TruthSample;
+
+/// Share of the grip from which the fastest drive on the true tires is in a corner.
+const CORNER: f64 = 0.9;
+
+/// What a lap gave.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Lap {
+    pub(crate) time_s: f64,
+    /// Distance to the line: mean and largest.
+    pub(crate) error_m: f64,
+    pub(crate) worst_m: f64,
+    /// Mean of the acceleration used over the grip in corners.
+    pub(crate) used: f64,
+    /// Times off the track.
+    pub(crate) exits: u32,
+    /// Grip planned at its end.
+    pub(crate) planned: f64,
+    /// What the driver drove on at its end.
+    pub(crate) trust: Option<Trust>,
+}
+
+/// Watches the truth.
+pub(crate) struct Referee {
+    track: Track,
+    fastest: SpeedProfile,
+    grip_mps2: f64,
+    half_width_m: f64,
+    pub(crate) laps: Vec<Lap>,
+    lap: Lap,
+    looks: (f64, f64),
+    began_s: f64,
+    station_m: f64,
+    outside: bool,
+    slow: u32,
+}
+
+impl Referee {
+    pub(crate) fn new(track: Track, limits: &Limits, half_width_m: f64) -> Self {
+        Self {
+            fastest: SpeedProfile::new(&track, limits),
+            track,
+            grip_mps2: limits.lateral_mps2,
+            half_width_m,
+            laps: Vec::new(),
+            lap: Lap::default(),
+            looks: (0.0, 0.0),
+            began_s: 0.0,
+            station_m: 0.0,
+            outside: false,
+            slow: 0,
+        }
+    }
+
+    /// Another floor from now on.
+    pub(crate) fn floor(&mut self, limits: &Limits) {
+        self.fastest = SpeedProfile::new(&self.track, limits);
+        self.grip_mps2 = limits.lateral_mps2;
+    }
+
+    /// Time of the fastest lap on the true tires, as planned.
+    pub(crate) fn fastest_lap_s(&self) -> f64 {
+        self.fastest.lap_time_s()
+    }
+
+    /// Times off the track since the start.
+    pub(crate) fn exits(&self) -> u32 {
+        self.laps.iter().map(|lap| lap.exits).sum::<u32>() + self.lap.exits
+    }
+
+    /// Distance driven along the line since the start.
+    pub(crate) fn along_m(&self) -> f64 {
+        self.laps.len() as f64 * self.track.length_m() + self.station_m
+    }
+
+    /// The reason for which the run cannot go on.
+    pub(crate) fn look(&mut self, now: &TruthSample, driver: &Driver) -> Option<&'static str> {
+        let (m, offset_m) = (&now.motion, now.offset_m.abs());
+        if now.station_m < 0.25 * self.track.length_m() && self.station_m > 0.75 * self.track.length_m() {
+            let lap = Lap {
+                time_s: m.time_s - self.began_s,
+                error_m: self.lap.error_m / self.looks.0,
+                used: self.lap.used / self.looks.1.max(1.0),
+                planned: driver.grip(),
+                trust: Some(driver.trust()),
+                ..self.lap
+            };
+            self.laps.push(lap);
+            (self.lap, self.looks, self.began_s) = (Lap::default(), (0.0, 0.0), m.time_s);
+        }
+        self.station_m = now.station_m;
+        self.lap.error_m += offset_m;
+        self.lap.worst_m = self.lap.worst_m.max(offset_m);
+        self.looks.0 += 1.0;
+        let fastest = self.fastest.at(now.station_m).0;
+        let point = self.track.at(now.station_m);
+        if fastest * fastest * point.curvature_1pm.abs() > CORNER * self.grip_mps2 {
+            self.lap.used += m.specific_x_mps2.hypot(m.specific_y_mps2) / self.grip_mps2;
+            self.looks.1 += 1.0;
+        }
+        let outside = offset_m > self.half_width_m;
+        self.lap.exits += u32::from(outside && !self.outside);
+        self.outside = outside;
+        let speed = m.v_x_mps.hypot(m.v_y_mps);
+        self.slow =
+            if speed < 0.05 * (self.grip_mps2 * self.track.length_m()).sqrt() { self.slow + 1 } else { 0 };
+        if speed > 1.0 && m.v_y_mps.atan2(m.v_x_mps).abs() > 1.0 {
+            Some("spin")
+        } else if offset_m > 3.0 * self.half_width_m {
+            Some("left the track")
+        } else if self.slow > 300 {
+            Some("standstill")
+        } else {
+            None
+        }
+    }
+}
