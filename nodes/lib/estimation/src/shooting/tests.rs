@@ -113,20 +113,29 @@ fn bounds_priors_and_fixed_parameters_hold() {
     );
 }
 
+/// A problem that is evaluated where it begins.
+fn looked_at<'a>(
+    plant: &'a Oscillator,
+    windows: &'a [Window],
+    parameters: &'a [Parameter],
+) -> Problem<'a, Oscillator> {
+    Problem {
+        model: plant,
+        windows,
+        sigma: &[0.01],
+        parameters,
+        robust_k: 2.0,
+        tolerance: TOLERANCE,
+        max_iterations: 0,
+    }
+}
+
 #[test]
 fn the_gradient_is_the_derivative_of_the_cost() {
     let plant = plant(0.01, 3);
     let windows = tile(&[1000], 50);
     let parameters = parameters();
-    let problem = Problem {
-        model: &plant,
-        windows: &windows,
-        sigma: &[0.01],
-        parameters: &parameters,
-        robust_k: 2.0,
-        tolerance: TOLERANCE,
-        max_iterations: 0,
-    };
+    let problem = looked_at(&plant, &windows, &parameters);
     // With the starts at their best, the gradient with the starts eliminated is the plain one.
     let found = fit(
         &Problem {
@@ -147,15 +156,7 @@ fn more_parameters_than_a_rollout_has_derivatives_of_are_taken_in_passes() {
     let plant = plant(0.01, 4);
     let windows = tile(&[1000], 50);
     let parameters = parameters();
-    let problem = Problem {
-        model: &plant,
-        windows: &windows,
-        sigma: &[0.01],
-        parameters: &parameters,
-        robust_k: 2.0,
-        tolerance: TOLERANCE,
-        max_iterations: 0,
-    };
+    let problem = looked_at(&plant, &windows, &parameters);
     let [(cost, information, gradient), passes] =
         super::linearize::by_lanes_and_in_passes(&problem, &[20.0, 1.0], [0.1, -0.2]);
     assert_eq!(problem.free().len(), 2);
