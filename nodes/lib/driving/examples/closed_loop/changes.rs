@@ -241,12 +241,21 @@ fn summary(rows: &[Row]) -> String {
     for car in cars {
         let _ = writeln!(
             text,
-            "## {car}\n\n| change | driver | changes | distance until it drives to the new grip (laps), median | 90 % | never | lap 1 after | lap 2 | lap 3 | changes with an exit before the next lap ends | exits | wrecks |\n|---|---|---|---|---|---|---|---|---|---|---|---|"
+            "## {car}\n\n| change | driver | changes | distance until it drives to the new grip (laps), median | 90 % | never | lap 1 after | lap 2 | lap 3 | changes with an exit before the next lap ends | over those of who is told | exits | wrecks |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|"
         );
         for wet in [true, false] {
             for knows in Knows::ALL {
+                // Who is never told comes back to a floor that it has never left.
                 let of = |knows: Knows| {
-                    rows.iter().filter(move |r| r.car == car && r.wet() == wet && r.knows == knows.name())
+                    rows.iter().filter(move |r| {
+                        r.car == car
+                            && r.wet() == wet
+                            && r.knows == knows.name()
+                            && (knows != Knows::Untold || r.change == 1)
+                    })
+                };
+                let told = |r: &Row| {
+                    of(Knows::Told).find(|t| (&t.track, t.seed, t.change) == (&r.track, r.seed, r.change))
                 };
                 let count = of(knows).count();
                 if count == 0 {
@@ -255,12 +264,7 @@ fn summary(rows: &[Row]) -> String {
                 let laps = |r: &Row| r.distance_m.map_or(f64::INFINITY, |m| m / r.lap_m);
                 let reached: Vec<f64> = of(knows).map(laps).filter(|l| l.is_finite()).collect();
                 let behind = |lap: fn(&Row) -> Option<f64>| {
-                    let told = |r: &Row| {
-                        of(Knows::Told)
-                            .find(|t| (&t.track, t.seed, t.change) == (&r.track, r.seed, r.change))
-                            .and_then(lap)
-                    };
-                    let ratios = of(knows).filter_map(|r| Some(lap(r)? / told(r)? - 1.0)).collect();
+                    let ratios = of(knows).filter_map(|r| Some(lap(r)? / lap(told(r)?)? - 1.0)).collect();
                     let median = 100.0 * median(ratios);
                     if knows == Knows::Told {
                         format!("{:.2} s", mean(of(knows).filter_map(lap)))
@@ -268,9 +272,12 @@ fn summary(rows: &[Row]) -> String {
                         format!("{median:+.1} %")
                     }
                 };
+                let left = |r: &Row| u32::from(r.exits_at_once > 0);
+                let pairs = || of(knows).filter_map(|r| Some((left(r), left(told(r)?))));
+                let (own, others) = pairs().fold((0, 0), |sums, pair| (sums.0 + pair.0, sums.1 + pair.1));
                 let _ = writeln!(
                     text,
-                    "| {} | {} | {count} | {:.2} | {:.2} | {} | {} | {} | {} | {} | {} | {} |",
+                    "| {} | {} | {count} | {:.3} | {:.3} | {} | {} | {} | {} | {} | {own} of {others} | {} | {} |",
                     if wet { "dry to wet" } else { "wet to dry" },
                     knows.name(),
                     median(reached.clone()),
@@ -279,7 +286,7 @@ fn summary(rows: &[Row]) -> String {
                     behind(|r| r.lap_1_s),
                     behind(|r| r.lap_2_s),
                     behind(|r| r.lap_3_s),
-                    of(knows).filter(|r| r.exits_at_once > 0).count(),
+                    of(knows).map(left).sum::<u32>(),
                     of(knows).map(|r| r.exits).sum::<u32>(),
                     of(knows).filter(|r| !r.wreck.is_empty()).count(),
                 );
