@@ -129,13 +129,9 @@ def main():
         data = rows(name)
         if data:
             text += table(title, data)
-    for title, name in [
-        ("Wrong priors", "envelope_priors.csv"),
-        ("Wrong priors, before: D as the fit with the prior has it", "envelope_priors_before.csv"),
-    ]:
-        data = rows(name)
-        if data:
-            text += priors(title, data)
+    data = rows("envelope_priors.csv")
+    if data:
+        text += priors("Wrong priors", data)
     data = rows("envelope_bags.csv") + rows("envelope_foreign.csv")
     if data:
         text += bags(data)
