@@ -96,7 +96,8 @@ impl Inferred {
         self.stated.as_ref()?.iter().find(|s| s.term == term)
     }
 
-    /// Whether the verdict names an effect: it, or another candidate that does nearly the same, is likely a cause, and not small beside what of the unexplained looks like it.
+    /// Whether the verdict names an effect: it, or another candidate that does nearly the same, is likely a cause, and not small beside what of the
+    /// unexplained looks like it.
     pub(crate) fn is_accepted(&self, effect: EffectId) -> bool {
         let holds = |s: &Statement| {
             s.chance_of_candidates() >= decisions::NAMED

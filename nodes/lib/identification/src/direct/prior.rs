@@ -62,8 +62,7 @@ pub(super) fn with_prior(
     peak: &PerAxle<PeakEvidence>,
     prior: FrictionPrior,
 ) -> [Vec<Parameter>; 2] {
-    let mut held = all.to_vec();
-    held.iter_mut().zip(&found.parameters).for_each(|(p, &v)| p.start = v);
+    let mut held = going_on(all, found);
     for d in places(peak, prior) {
         held[d].prior = Some(Prior { mean: prior.mu, sigma: axle_sigma(prior) });
     }
@@ -82,8 +81,7 @@ pub(super) fn with_believed(
     peak: &PerAxle<PeakEvidence>,
     prior: FrictionPrior,
 ) -> [Vec<Parameter>; 2] {
-    let mut held = all.to_vec();
-    held.iter_mut().zip(&found.parameters).for_each(|(p, &v)| p.start = v);
+    let mut held = going_on(all, found);
     for (d, axle) in axles(peak, prior) {
         held[d].start = believed(prior, found.parameters[d], axle.height).mean;
         (held[d].free, held[d].prior) = (false, None);
@@ -91,6 +89,11 @@ pub(super) fn with_believed(
     let mut likely = held.clone();
     likely_shape(&mut likely, peak, prior);
     [held, likely]
+}
+
+/// The parameters of a fit that begins where another one ended.
+fn going_on(all: &[Parameter], found: &Fit) -> Vec<Parameter> {
+    all.iter().zip(&found.parameters).map(|(p, &start)| Parameter { start, ..*p }).collect()
 }
 
 fn likely_shape(all: &mut [Parameter], peak: &PerAxle<PeakEvidence>, prior: FrictionPrior) {
