@@ -147,6 +147,9 @@ pub(crate) struct Timing {
     pub(crate) reading_s: f64,
     pub(crate) diagnosing_s: f64,
     pub(crate) total_s: f64,
+    /// In the user's simulator.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) simulator_s: Option<f64>,
 }
 
 /// Runs the subcommand.
@@ -252,7 +255,8 @@ pub(crate) fn run(args: &DiagnoseArgs) -> anyhow::Result<Outcome> {
         checks: &recorded.checks.checks,
         signals: SignalsOf::new(&recorded),
     };
-    let timing = Timing { reading_s, diagnosing_s, total_s: start.elapsed().as_secs_f64() };
+    let timing =
+        Timing { reading_s, diagnosing_s, total_s: start.elapsed().as_secs_f64(), simulator_s: None };
     let texts = [
         serde_json::to_string_pretty(&gap_file)? + "\n",
         page,

@@ -98,7 +98,9 @@ pub(crate) fn run(args: &DiagnoseArgs, simulator_file: &Path) -> anyhow::Result<
         topics: topic_uses(&report.topics),
         data_notes: &notes,
     };
-    let timing = Timing { reading_s, diagnosing_s, total_s: start.elapsed().as_secs_f64() };
+    let total_s = start.elapsed().as_secs_f64();
+    let simulator_s = Some(result.simulator.took_s[1]);
+    let timing = Timing { reading_s, diagnosing_s, total_s, simulator_s };
     let mut files = vec![
         ("gap.json", serde_json::to_string_pretty(&gap)? + "\n"),
         ("report.html", page),

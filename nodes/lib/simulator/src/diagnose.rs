@@ -1,6 +1,7 @@
 //! The whole question: which differences make the simulator unlike the car, how large, and how much they close.
 
 use std::collections::BTreeMap;
+use std::time::Instant;
 
 use gripsight_signals::{DataHealth, StateSequence};
 
@@ -58,7 +59,7 @@ pub fn diagnose(
     wanted.retain(|c| description.output(*c).is_some());
     let drive = Drive::new(question.sequence, question.commands.clone(), &wanted)?;
     let list = candidates(description, question.file, &drive.channels, imposed, question.without);
-    let before = roll.passes();
+    let (start, before, busy) = (Instant::now(), roll.passes(), roll.busy());
     let model = Model::new(roll, question.file, &drive, &list, imposed);
     let fitter = Fitter::new(&model);
     let found = fitter.search(progress)?;
@@ -152,6 +153,7 @@ pub fn diagnose(
             rollouts: (roll.passes() - before) as f64 / drive.stretches.len().max(1) as f64,
             candidates: list.len(),
             lacks: description.lacks.clone(),
+            took_s: [start.elapsed(), roll.busy() - busy].map(|t| t.as_secs_f64()),
         },
         changes: changes.collect(),
         fitted: list.iter().zip(&state.point.values).map(|(c, v)| (c.name.clone(), *v)).collect(),

@@ -1,4 +1,4 @@
-//! Gauss-Newton on a simulator: derivatives are rollouts, so none is wasted.
+//! A point of a simulator's parameters and starts, its derivatives, which are rollouts, and what the sizes there are worth.
 
 use nalgebra::DVector;
 
@@ -23,6 +23,8 @@ pub(crate) struct Fitted {
     pub(crate) state: State,
     /// The candidates fitted, with 90 % interval and the square of size over standard error; in their order.
     pub(crate) sizes: Vec<Size>,
+    /// Derivatives by them.
+    pub(crate) columns: Vec<Residuals>,
 }
 
 /// A fitted size.
@@ -53,6 +55,29 @@ impl State {
         (0..self.costs.len()).filter(|&w| layout.held_out[w]).map(|w| self.costs[w]).sum()
     }
 
+    /// How far residuals move by what moved between another state and this one, as far as derivatives there reach.
+    pub(crate) fn predicted(
+        &self,
+        from: &Self,
+        layout: &Layout,
+        active: &[usize],
+        columns: &[Residuals],
+    ) -> Residuals {
+        let shifts: Vec<DVector<f64>> = self
+            .point
+            .starts
+            .iter()
+            .zip(&from.point.starts)
+            .map(|(to, at)| DVector::from_iterator(to.len(), to.iter().zip(at).map(|(to, at)| to - at)))
+            .collect();
+        let mut out = from.starts.moved_by(layout, &shifts);
+        for (&c, column) in active.iter().zip(columns) {
+            let change = self.point.values[c] - from.point.values[c];
+            out.iter_mut().zip(column).for_each(|(m, d)| *m += change * d);
+        }
+        out
+    }
+
     /// Another point, with the starts as the derivatives say that they follow; `moved`: how far residuals move that way.
     fn moved(&self, layout: &Layout, values: Vec<f64>, moved: &Residuals) -> Point {
         let (_, extra) = self.starts.project(layout, moved);
@@ -68,6 +93,8 @@ impl State {
 pub(crate) struct Fitter<'a> {
     pub(crate) model: &'a Model<'a>,
     pub(crate) layout: Layout,
+    /// Passes when it began.
+    begun: usize,
 }
 
 impl<'a> Fitter<'a> {
@@ -83,15 +110,21 @@ impl<'a> Fitter<'a> {
             held_out: model.drive.windows.iter().map(|w| w.held_out).collect(),
             block: model.drive.windows.iter().map(|w| w.block).collect(),
         };
-        Self { model, layout }
+        Self { model, layout, begun: model.roll.passes() }
+    }
+
+    /// Rollouts of the recording so far.
+    pub(crate) fn rollouts(&self) -> f64 {
+        let stretches = self.model.drive.stretches.len().max(1);
+        (self.model.roll.passes() - self.begun) as f64 / stretches as f64
     }
 
     /// The simulator at a point, its starts fitted.
     pub(crate) fn at(&self, point: Point) -> Result<State, SimulatorError> {
         let first = self.around(point, None, &[])?.0;
-        let none = vec![0.0; first.residuals.len()];
-        let point = first.moved(&self.layout, first.point.values.clone(), &none);
-        Ok(self.around(point, None, &[])?.0)
+        let values = first.point.values.clone();
+        let there = self.trials(&first, &[], &[values])?.into_iter().next();
+        Ok(there.filter(|s| s.residuals.iter().all(|r| r.is_finite())).unwrap_or(first))
     }
 
     /// The derivatives by the starts and by some candidates, projected, at a point; the residuals there where they are known.
@@ -179,66 +212,25 @@ impl<'a> Fitter<'a> {
                 state.moved(&self.layout, values.clone(), &moved)
             })
             .collect();
+        self.states(state, points)
+    }
+
+    /// Evaluates values of candidates around a state, its starts as they are.
+    pub(crate) fn still(&self, state: &State, values: &[Vec<f64>]) -> Result<Vec<State>, SimulatorError> {
+        let starts = &state.point.starts;
+        self.states(
+            state,
+            values.iter().map(|v| Point { values: v.clone(), starts: starts.clone() }).collect(),
+        )
+    }
+
+    fn states(&self, near: &State, points: Vec<Point>) -> Result<Vec<State>, SimulatorError> {
         let results = self.model.residuals(&points)?;
         Ok(points
             .into_iter()
             .zip(results)
-            .map(|(point, r)| State::new(&self.layout, point, r, state.starts.clone()))
+            .map(|(point, r)| State::new(&self.layout, point, r, near.starts.clone()))
             .collect())
-    }
-
-    /// Fits some candidates together, from a state on.
-    pub(crate) fn fit(
-        &self,
-        from: &State,
-        active: &[usize],
-        iterations: usize,
-    ) -> Result<Fitted, SimulatorError> {
-        const TOLERANCE: f64 = 1e-3;
-        let layout = &self.layout;
-        let known = Some(from.residuals.clone());
-        let (mut state, mut columns) = self.around(from.point.clone(), known, active)?;
-        let mut damping = 1e-3;
-        for iteration in 0..iterations {
-            let projected: Vec<Residuals> =
-                columns.iter().map(|c| state.starts.project(layout, c).0).collect();
-            let normal = Normal::new(layout, &state.projected, &projected.iter().collect::<Vec<_>>());
-            let pairs: Vec<(usize, &Residuals)> = active.iter().copied().zip(&columns).collect();
-            let trial = |damping: f64| {
-                normal.step(damping).map(|step| {
-                    let mut values = state.point.values.clone();
-                    active
-                        .iter()
-                        .zip(step.iter())
-                        .for_each(|(&c, s)| values[c] = self.within(c, values[c] + s));
-                    values
-                })
-            };
-            let tried: Vec<Vec<f64>> =
-                [damping, 30.0 * damping + 0.3].into_iter().filter_map(trial).collect();
-            let trials = self.trials(&state, &pairs, &tried)?;
-            let costs: Vec<f64> = trials.iter().map(|t| t.training(layout)).collect();
-            let Some(best) = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])) else { break };
-            let before = state.training(layout);
-            if costs[best].is_nan() || costs[best] >= before {
-                if damping > 10.0 {
-                    break;
-                }
-                damping = 100.0 * damping + 1.0;
-                continue;
-            }
-            damping = if best == 0 { 0.1 * damping } else { 3.0 * damping };
-            let taken = trials.into_iter().nth(best).unwrap_or_else(|| state.clone());
-            let done = (before - costs[best]) / before.max(f64::MIN_POSITIVE) < TOLERANCE;
-            if done || iteration + 1 == iterations {
-                state = taken;
-                break;
-            }
-            let residuals = taken.residuals.clone();
-            (state, columns) = self.around(taken.point, Some(residuals), active)?;
-        }
-        let sizes = self.sizes(&state, active, &columns);
-        Ok(Fitted { state, sizes })
     }
 
     pub(crate) fn within(&self, candidate: usize, value: f64) -> f64 {
@@ -246,7 +238,7 @@ impl<'a> Fitter<'a> {
         value.clamp(c.low, c.high)
     }
 
-    fn sizes(&self, state: &State, active: &[usize], columns: &[Residuals]) -> Vec<Size> {
+    pub(crate) fn sizes(&self, state: &State, active: &[usize], columns: &[Residuals]) -> Vec<Size> {
         let projected: Vec<Residuals> =
             columns.iter().map(|c| state.starts.project(&self.layout, c).0).collect();
         let normal = Normal::new(&self.layout, &state.projected, &projected.iter().collect::<Vec<_>>());

@@ -7,6 +7,7 @@ mod budget;
 mod candidates;
 mod child;
 mod commands;
+mod descent;
 mod description;
 mod diagnose;
 mod drive;

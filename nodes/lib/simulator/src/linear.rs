@@ -59,6 +59,17 @@ impl Starts {
         Self { blocks: blocks.collect() }
     }
 
+    /// How far residuals move where every window's start moves by so much.
+    pub(crate) fn moved_by(&self, layout: &Layout, shifts: &[DVector<f64>]) -> Residuals {
+        let mut out = vec![0.0; layout.windows.iter().map(|(from, len)| from + len).max().unwrap_or(0)];
+        for ((&(from, len), (a, _)), shift) in layout.windows.iter().zip(&self.blocks).zip(shifts) {
+            if a.ncols() > 0 {
+                out[from..from + len].copy_from_slice((a * shift).as_slice());
+            }
+        }
+        out
+    }
+
     /// What no start explains of a vector, and by how much each window's start must move to explain the rest.
     pub(crate) fn project(&self, layout: &Layout, v: &[f64]) -> (Residuals, Vec<DVector<f64>>) {
         let mut out = v.to_vec();

@@ -5,7 +5,17 @@ use crate::fit::{Fitter, State};
 use crate::linear::Normal;
 use crate::model::Residuals;
 
+/// Shares of a value: far from it, and around the best ever closer.
+const FAR: [f64; 3] = [0.5, 0.75, 1.4];
+const CLOSER: [[f64; 4]; 3] = [[0.8, 0.9, 1.1, 1.2], [0.94, 0.97, 1.03, 1.06], [0.98, 0.99, 1.01, 1.02]];
+
 impl Fitter<'_> {
+    /// Rollouts that looking without derivatives takes at most.
+    pub(crate) fn zooming(&self) -> f64 {
+        let own = self.model.candidates.iter().filter(|c| c.is_own() && !c.integer).count();
+        (own * FAR.len() + CLOSER.as_flattened().len()) as f64
+    }
+
     /// Looks without derivatives, where these do not lead to what is left: a controller that switches makes a simulator's answer rough. Of
     /// every parameter of its own a few values far apart; around the best of all ever closer ones.
     pub(crate) fn zoom(
@@ -13,9 +23,6 @@ impl Fitter<'_> {
         state: &State,
         active: &[usize],
     ) -> Result<Option<(usize, State)>, SimulatorError> {
-        const FAR: [f64; 3] = [0.5, 0.75, 1.4];
-        const CLOSER: [[f64; 4]; 3] =
-            [[0.8, 0.9, 1.1, 1.2], [0.94, 0.97, 1.03, 1.06], [0.98, 0.99, 1.01, 1.02]];
         let layout = &self.layout;
         let candidates = self.model.candidates.iter().enumerate();
         let rough =
@@ -47,46 +54,53 @@ impl Fitter<'_> {
     }
 
     /// Looks further where a small change shows nothing, such as at a limit that is not reached: by candidate the best of a few values
-    /// between here and its bounds, with what it gains.
+    /// between here and its bounds, with what it gains; and the candidates that show nothing there, either.
+    #[allow(clippy::type_complexity, reason = "two lists")]
     pub(crate) fn scan(
         &self,
         state: &State,
         silent: &[usize],
-    ) -> Result<Vec<(usize, f64, Vec<f64>)>, SimulatorError> {
-        /// Shares of the way to the lower and to the upper bound: scales are positive, and their small values lie close together.
-        const DOWN: [f64; 4] = [0.5, 0.8, 0.9, 0.95];
-        const UP: [f64; 3] = [0.05, 0.2, 0.5];
+    ) -> Result<(Vec<(usize, f64, Vec<f64>)>, Vec<usize>), SimulatorError> {
+        /// Shares of the way to the lower and to the upper bound: scales are positive, and their small values lie close together. First
+        /// where most shows; the others only of candidates that show something there.
+        const FIRST: [f64; 2] = [-0.95, 0.5];
+        const THEN: [f64; 5] = [-0.9, -0.8, -0.5, 0.05, 0.2];
         let layout = &self.layout;
-        let mut values: Vec<(usize, Vec<f64>)> = Vec::new();
-        for &c in silent {
-            let (candidate, here) = (&self.model.candidates[c], state.point.values[c]);
-            let to = |bound: f64, share: f64| {
-                let mut other = state.point.values.clone();
-                let value = here + share * (bound - here);
-                other[c] = if candidate.integer { value.round() } else { value };
-                (c, other)
-            };
-            values.extend(
-                DOWN.map(|s| to(candidate.low, s)).into_iter().chain(UP.map(|s| to(candidate.high, s))),
-            );
-        }
-        values.retain(|(c, v)| v[*c] != state.point.values[*c]);
-        if values.is_empty() {
-            return Ok(Vec::new());
-        }
-        let trials = self.trials(state, &[], &values.iter().map(|v| v.1.clone()).collect::<Vec<_>>())?;
         let before = state.training(layout);
         let mut best: Vec<(usize, f64, Vec<f64>)> = Vec::new();
-        for ((c, values), trial) in values.into_iter().zip(trials) {
-            let gain = before - trial.training(layout);
-            let place = best.iter().position(|b| b.0 == c);
-            match place {
-                Some(p) if best[p].1 < gain => best[p] = (c, gain, values),
-                None if gain > 0.0 => best.push((c, gain, values)),
-                _ => {}
+        let (mut looked, mut shown) = (silent.to_vec(), Vec::new());
+        for shares in [FIRST.as_slice(), &THEN] {
+            let mut values: Vec<(usize, Vec<f64>)> = Vec::new();
+            for &c in &looked {
+                let (candidate, here) = (&self.model.candidates[c], state.point.values[c]);
+                for share in shares {
+                    let bound = if *share < 0.0 { candidate.low } else { candidate.high };
+                    let value = here + share.abs() * (bound - here);
+                    let mut other = state.point.values.clone();
+                    other[c] = if candidate.integer { value.round() } else { value };
+                    values.push((c, other));
+                }
+            }
+            values.retain(|(c, v)| v[*c] != state.point.values[*c]);
+            if values.is_empty() {
+                break;
+            }
+            let points: Vec<Vec<f64>> = values.iter().map(|v| v.1.clone()).collect();
+            let trials = self.still(state, &points)?;
+            let seen = |trial: &State| trial.residuals != state.residuals;
+            looked = values.iter().zip(&trials).filter(|(_, t)| seen(t)).map(|((c, _), _)| *c).collect();
+            looked.dedup();
+            shown.extend(&looked);
+            for ((c, values), trial) in values.into_iter().zip(trials) {
+                let gain = before - trial.training(layout);
+                match best.iter().position(|b| b.0 == c) {
+                    Some(p) if best[p].1 < gain => best[p] = (c, gain, values),
+                    None if gain > 0.0 => best.push((c, gain, values)),
+                    _ => {}
+                }
             }
         }
-        Ok(best)
+        Ok((best, silent.iter().copied().filter(|c| !shown.contains(c)).collect()))
     }
 
     /// Follows each candidate along its own line: where the line of two points has its least, there is the next.

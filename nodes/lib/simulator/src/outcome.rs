@@ -230,6 +230,9 @@ pub struct SimulatorUse {
     pub candidates: usize,
     /// What it says that it has no term for.
     pub lacks: Vec<String>,
+    /// Time that the inference took, s; and what of it was spent in the simulator.
+    #[serde(skip)]
+    pub took_s: [f64; 2],
 }
 
 /// A diagnosis with a user's simulator.

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ndarray::{Array3, Axis, concatenate};
 
@@ -24,6 +24,9 @@ pub trait Roll: Sync {
 
     /// Passes so far.
     fn passes(&self) -> usize;
+
+    /// Time spent in it so far.
+    fn busy(&self) -> Duration;
 }
 
 /// A user's simulator, running.
@@ -32,6 +35,7 @@ pub struct Simulator {
     description: Description,
     children: Vec<Mutex<Child>>,
     passes: AtomicUsize,
+    busy: Mutex<Duration>,
     // Holds sockets and adapters; last, so that it goes after the processes.
     _scratch: tempfile::TempDir,
 }
@@ -85,6 +89,7 @@ impl Simulator {
             description,
             children: children.into_iter().map(Mutex::new).collect(),
             passes: AtomicUsize::new(0),
+            busy: Mutex::default(),
             _scratch: scratch,
         })
     }
@@ -99,7 +104,12 @@ impl Roll for Simulator {
         self.passes.load(Ordering::Relaxed)
     }
 
+    fn busy(&self) -> Duration {
+        *self.busy.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn rollout(&self, batch: &Batch) -> Result<Array3<f64>, SimulatorError> {
+        let start = Instant::now();
         let passes = batch.passes();
         self.passes.fetch_add(passes, Ordering::Relaxed);
         let channels = self.description.outputs.len();
@@ -120,6 +130,7 @@ impl Roll for Simulator {
             // A thread of ours that panics is passed on as the panic that it is.
             started.into_iter().map(|t| t.join().unwrap_or_else(|e| std::panic::resume_unwind(e))).collect()
         });
+        *self.busy.lock().unwrap_or_else(PoisonError::into_inner) += start.elapsed();
         let parts = parts.into_iter().collect::<Result<Vec<_>, _>>()?;
         let views: Vec<_> = parts.iter().map(|part| part.view()).collect();
         concatenate(Axis(0), &views)

@@ -1,7 +1,8 @@
 //! Which candidates differ: one after the other, each decided by the same comparison.
 //!
-//! A round: derivatives by every candidate at the model so far; the likeliest are followed along their own line, the likeliest two of
-//! these fitted together with those found before. The better one is taken where
+//! A round: derivatives by the candidates at the model so far, by all in the first round, then by the likeliest as far as those reach; the
+//! likeliest few are followed along their own line, the likeliest two of these fitted together with those found before. The better one is
+//! taken where
 //!
 //! ```text
 //! (size / standard error)^2  >  log(clusters) + 2 log(candidates)        (extended BIC, with errors robust to clusters)
@@ -16,12 +17,19 @@ use crate::model::Residuals;
 
 /// Candidates that are followed along their line in a round.
 const FOLLOWED: usize = 6;
+/// Candidates whose derivatives are taken anew after the first round.
+const SCREENED: usize = 14;
+/// Rollouts of the recording that a whole diagnosis may take, and those that a last round and the free terms do.
+const MOST_ROLLOUTS: f64 = 300.0;
+const LAST: f64 = 85.0;
 /// Effects at most.
 const MOST_FOUND: usize = 3;
 /// Cost per residual above which what the likeliest candidate leaves is more than noise.
 const UNEXPLAINED: f64 = 1.5;
+/// Share of the cost from which what is left beside the likeliest candidate says that derivatives may not lead to the cause.
+const SLOW: f64 = 0.1;
 /// Gauss-Newton steps of a fit.
-const STEPS: usize = 6;
+const STEPS: usize = 10;
 
 /// What a round came to.
 #[derive(Debug, Clone)]
@@ -41,6 +49,12 @@ pub(crate) struct Found {
     pub(crate) fits: Vec<Fitted>,
     /// A round for each effect taken, and the last, in which none was.
     pub(crate) rounds: Vec<Round>,
+    /// Candidates that show nothing anywhere between their bounds.
+    mute: Vec<usize>,
+    /// Derivatives by every candidate, where they were last taken.
+    columns: Vec<Residuals>,
+    /// Whether values far apart have been looked at.
+    zoomed: bool,
 }
 
 impl Found {
@@ -63,10 +77,17 @@ impl Fitter<'_> {
     pub(crate) fn search(&self, progress: &mut dyn FnMut(&str)) -> Result<Found, SimulatorError> {
         progress("the simulator as it came");
         let null = self.at(self.model.null())?;
-        let mut found = Found { null, fits: Vec::new(), rounds: Vec::new() };
-        while found.fits.len() < MOST_FOUND {
+        let mut found = Found {
+            null,
+            fits: Vec::new(),
+            rounds: Vec::new(),
+            mute: Vec::new(),
+            columns: Vec::new(),
+            zoomed: false,
+        };
+        while found.fits.len() < MOST_FOUND && self.rollouts() + LAST <= MOST_ROLLOUTS {
             progress(&format!("effect {}", found.fits.len() + 1));
-            let (round, taken) = self.round(&found)?;
+            let (round, taken) = self.round(&mut found)?;
             found.rounds.push(round);
             match taken {
                 Some(fitted) => {
@@ -89,7 +110,9 @@ impl Fitter<'_> {
             let mut values = last.state.point.values.clone();
             values[together[k]] = self.model.candidates[together[k]].null;
             let Some(start) = self.trials(&last.state, &[], &[values])?.into_iter().next() else { continue };
-            let without = self.fit(&start, &kept, STEPS)?;
+            let mut columns = last.columns.clone();
+            columns.remove(k);
+            let without = self.fit(&start, &kept, columns, STEPS)?;
             let residuals = self.residuals();
             let best = last.state.training(layout).min(without.state.training(layout));
             let scale = (best / residuals).max(1.0);
@@ -98,15 +121,22 @@ impl Fitter<'_> {
                 found.fits.remove(k);
                 found.rounds.remove(k);
                 let end = found.fits.len() - 1;
-                found.fits[end] = without;
-                for (place, fit) in found.fits[..end].iter_mut().enumerate() {
-                    if let Some(way) = (place >= k).then_some(&kept[..=place]) {
-                        *fit = self.fit(&fit.state, way, 2)?;
-                    }
+                for place in k..end {
+                    found.fits[place] = self.step_on_the_way(&without, &kept[..=place])?;
                 }
+                found.fits[end] = without;
             }
         }
         Ok(())
+    }
+
+    /// The first few of the candidates of a fit alone.
+    fn step_on_the_way(&self, end: &Fitted, first: &[usize]) -> Result<Fitted, SimulatorError> {
+        let mut values = self.model.null().values;
+        first.iter().for_each(|&c| values[c] = end.state.point.values[c]);
+        let start = self.trials(&end.state, &[], &[values])?.into_iter().next();
+        let columns = end.columns[..first.len()].to_vec();
+        self.fit(start.as_ref().unwrap_or(&end.state), first, columns, 3)
     }
 
     /// What a size over its standard error, squared, must exceed.
@@ -115,50 +145,41 @@ impl Fitter<'_> {
         clusters.ln() + 2.0 * (self.model.candidates.len().max(1) as f64).ln()
     }
 
-    fn round(&self, found: &Found) -> Result<(Round, Option<Fitted>), SimulatorError> {
+    fn round(&self, found: &mut Found) -> Result<(Round, Option<Fitted>), SimulatorError> {
         let layout = &self.layout;
         let active = found.active();
-        let all: Vec<usize> = (0..self.model.candidates.len()).collect();
         let here = found.state();
-        let (state, columns) = self.around(here.point.clone(), Some(here.residuals.clone()), &all)?;
-        let projected: Vec<Residuals> = columns.iter().map(|c| state.starts.project(layout, c).0).collect();
+        let all: Vec<usize> = (0..self.model.candidates.len()).filter(|c| !found.mute.contains(c)).collect();
+        let looked = match found.columns.is_empty() {
+            true => all,
+            false => self.screened(here, &found.columns, &active, &all),
+        };
+        let (state, known) = self.around(here.point.clone(), Some(here.residuals.clone()), &looked)?;
+        let mut columns = std::mem::take(&mut found.columns);
+        columns.resize(self.model.candidates.len(), vec![0.0; state.residuals.len()]);
+        looked.iter().zip(known).for_each(|(&c, column)| columns[c] = column);
         let before = state.training(layout);
-        // As far as the derivatives reach: what each would gain beside those found, and where it would come to lie.
-        let mut likely: Vec<(usize, f64, Vec<f64>)> = all
-            .iter()
-            .filter(|c| !active.contains(c))
-            .filter_map(|&c| {
-                let together: Vec<usize> = active.iter().copied().chain([c]).collect();
-                let parts: Vec<&Residuals> = together.iter().map(|&c| &projected[c]).collect();
-                let normal = Normal::new(layout, &state.projected, &parts);
-                let mut step = normal.step(1e-6)?;
-                for (s, &c) in step.iter_mut().zip(&together) {
-                    *s = self.within(c, state.point.values[c] + *s) - state.point.values[c];
-                }
-                let mut values = state.point.values.clone();
-                together.iter().zip(step.iter()).for_each(|(&c, s)| values[c] += s);
-                Some((c, normal.gain(&step), values))
-            })
-            .filter(|(c, gain, values)| *gain > 0.0 && values[*c] != state.point.values[*c])
-            .collect();
+        let mut likely = self.likely(&state, &columns, &active, &looked);
         let silent: Vec<usize> =
-            all.iter().copied().filter(|c| !active.contains(c) && is_silent(&projected[*c])).collect();
+            looked.iter().copied().filter(|c| !active.contains(c) && is_silent(&columns[*c])).collect();
         likely.retain(|(c, _, _)| !silent.contains(c));
-        likely.extend(self.scan(&state, &silent)?);
+        let (seen, mute) = self.scan(&state, &silent)?;
+        likely.extend(seen);
+        found.mute.extend(mute);
         likely.sort_by(|a, b| b.1.total_cmp(&a.1));
         likely.truncate(FOLLOWED);
-        let mut followed = self.follow(&state, &columns, &likely)?;
-        let left = followed.first().map_or(before, |(_, s)| s.training(layout)) / self.residuals();
-        if left > UNEXPLAINED {
-            followed.extend(self.zoom(&state, &active)?);
-            followed.sort_by(|a, b| a.1.training(layout).total_cmp(&b.1.training(layout)));
-        }
+        let followed = self.follow(&state, &columns, &likely)?;
         let compared: Vec<(usize, f64)> = followed.iter().map(|(c, s)| (*c, s.training(layout))).collect();
         let mut round = Round { compared, confused: Vec::new() };
         // Where even the best gains less than its name costs, nothing is fitted.
         let needed = self.needed();
         let mut fits: Vec<Fitted> = Vec::new();
         let mut tried: Vec<usize> = Vec::new();
+        let fit = |c: usize, trial: &State| {
+            let together: Vec<usize> = active.iter().copied().chain([c]).collect();
+            let known = together.iter().map(|&c| columns[c].clone()).collect();
+            self.fit(trial, &together, self.learned(&state, trial, &together, known), STEPS)
+        };
         for (c, trial) in &followed {
             if tried.len() == 2 || tried.contains(c) {
                 continue;
@@ -167,9 +188,17 @@ impl Fitter<'_> {
             if before - trial.training(layout) < 0.5 * needed {
                 continue;
             }
-            let together: Vec<usize> = active.iter().copied().chain([*c]).collect();
-            fits.push(self.fit(trial, &together, STEPS)?);
+            fits.push(fit(*c, trial)?);
         }
+        let left = fits.iter().map(|f| f.state.training(layout)).fold(before, f64::min);
+        let affordable = self.rollouts() + self.zooming() + LAST <= MOST_ROLLOUTS;
+        if !found.zoomed && affordable && left > (UNEXPLAINED * self.residuals()).max(SLOW * before) {
+            found.zoomed = true;
+            if let Some((c, trial)) = self.zoom(&state, &active)? {
+                fits.push(fit(c, &trial)?);
+            }
+        }
+        found.columns = columns;
         fits.sort_by(|a, b| a.state.training(layout).total_cmp(&b.state.training(layout)));
         let Some(best) = fits.first() else { return Ok((round, None)) };
         let of = |f: &Fitted| f.sizes.last().map(|s| s.candidate);
@@ -201,6 +230,47 @@ impl Fitter<'_> {
         let evident = chosen.sizes.last().is_some_and(|s| s.wald > needed);
         let carries_over = chosen.state.held_out(layout) < state.held_out(layout);
         Ok((round, (evident && carries_over).then(|| chosen.clone())))
+    }
+
+    /// As far as derivatives reach: what each candidate would gain beside those found, and where it would come to lie.
+    fn likely(
+        &self,
+        state: &State,
+        columns: &[Residuals],
+        active: &[usize],
+        among: &[usize],
+    ) -> Vec<(usize, f64, Vec<f64>)> {
+        let layout = &self.layout;
+        let project = |c: usize| state.starts.project(layout, &columns[c]).0;
+        let beside: Vec<Residuals> = active.iter().map(|&c| project(c)).collect();
+        let look = |c: usize| {
+            let own = project(c);
+            let together: Vec<usize> = active.iter().copied().chain([c]).collect();
+            let parts: Vec<&Residuals> = beside.iter().chain([&own]).collect();
+            let normal = Normal::new(layout, &state.projected, &parts);
+            let mut step = normal.step(1e-6)?;
+            for (s, &c) in step.iter_mut().zip(&together) {
+                *s = self.within(c, state.point.values[c] + *s) - state.point.values[c];
+            }
+            let mut values = state.point.values.clone();
+            together.iter().zip(step.iter()).for_each(|(&c, s)| values[c] += s);
+            Some((c, normal.gain(&step), values))
+        };
+        let others = among.iter().copied().filter(|c| !active.contains(c) && !is_silent(&columns[*c]));
+        others
+            .filter_map(look)
+            .filter(|(c, gain, values)| *gain > 0.0 && values[*c] != state.point.values[*c])
+            .collect()
+    }
+
+    /// The candidates whose derivatives are worth taking anew: those found, the likeliest by the derivatives last taken, and those that these
+    /// say nothing of.
+    fn screened(&self, state: &State, columns: &[Residuals], active: &[usize], all: &[usize]) -> Vec<usize> {
+        let mut likely = self.likely(state, columns, active, all);
+        likely.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let best: Vec<usize> = likely.iter().take(SCREENED).map(|(c, _, _)| *c).collect();
+        let wanted = |c: &usize| active.contains(c) || best.contains(c) || is_silent(&columns[*c]);
+        all.iter().copied().filter(wanted).collect()
     }
 
     /// Residuals of the training windows.

@@ -91,7 +91,8 @@ fn budget(d: &SimulatorDiagnosis) -> Markup {
             @if logarithmic(&rows) { "Bars by the logarithm. " }
             "Mean squared error of rollouts of " (significant(g.horizon_s, 2)) " s on " (g.scored_on) ", each channel over its noise ("
             (noise.join(", ")) "), each window from its best start. Simulator " (d.simulator.name) ", rolled out over the recording "
-            (significant(d.simulator.rollouts, 3)) " times for " (d.simulator.candidates) " candidates."
+            (significant(d.simulator.rollouts, 3)) " times for " (d.simulator.candidates) " candidates ("
+            (significant(d.simulator.took_s[0], 2)) " s, " (significant(d.simulator.took_s[1], 2)) " s of them in the simulator)."
         }
     }
 }

@@ -163,9 +163,11 @@ pub fn simulator_text(d: &SimulatorDiagnosis, patch: &PatchSaid, data_notes: &[S
     lines(&mut out, "by hand    ", &patch.by_hand);
     let _ = writeln!(
         out,
-        "cost       {} rollouts of the recording for {} candidates",
+        "cost       {} rollouts of the recording for {} candidates: {} s, {} s of them in the simulator",
         fixed(d.simulator.rollouts, 0),
-        d.simulator.candidates
+        d.simulator.candidates,
+        significant(d.simulator.took_s[0], 2),
+        significant(d.simulator.took_s[1], 2)
     );
     out
 }
