@@ -13,6 +13,7 @@ macro_rules! definitions {
 const DEFINITIONS: &[(&str, &str)] = definitions! {
     "msg": "gripsight_msgs" {
         "Excitation"
+        "ExtendedModel"
         "FrictionPrior"
         "GapEffect"
         "GapParameter"
@@ -22,6 +23,8 @@ const DEFINITIONS: &[(&str, &str)] = definitions! {
         "Handshake"
         "IdentificationProgress"
         "Interval"
+        "Longitudinal"
+        "LongitudinalLimit"
         "MagicFormula"
         "PacejkaParams"
         "PeakFriction"

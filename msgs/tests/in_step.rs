@@ -9,8 +9,8 @@ use gripsight_msgs::standard::{
     ackermann_msgs, builtin_interfaces, diagnostic_msgs, nav_msgs, rcl_interfaces, rosgraph_msgs, sensor_msgs,
 };
 use gripsight_msgs::{
-    Excitation, FrictionPrior, GapReport, Grip, IdentificationProgress, Message, PacejkaParams, Residual,
-    ResidualModel, StateSequence, TirePosterior, definition, schema, type_names,
+    Excitation, ExtendedModel, FrictionPrior, GapReport, Grip, IdentificationProgress, Message,
+    PacejkaParams, Residual, ResidualModel, StateSequence, TirePosterior, definition, schema, type_names,
 };
 use serde_reflection::{ContainerFormat, Format, Named, Registry, Tracer, TracerConfig};
 
@@ -22,6 +22,7 @@ fn registry() -> Registry {
     }
     trace!(
         Excitation,
+        ExtendedModel,
         FrictionPrior,
         GapReport,
         Grip,
@@ -141,6 +142,8 @@ fn a_schema_holds_every_nested_type_once() {
             "builtin_interfaces/Time",
             "gripsight_msgs/Handshake",
             "gripsight_msgs/Interval",
+            "gripsight_msgs/Longitudinal",
+            "gripsight_msgs/LongitudinalLimit",
             "gripsight_msgs/MagicFormula",
             "gripsight_msgs/PeakFriction",
             "gripsight_msgs/Range",

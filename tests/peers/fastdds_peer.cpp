@@ -88,6 +88,15 @@ public:
         doubles("signals", {"steering_delay_s", "steering_gain", "steering_offset_rad", "v_y_lever_arm_m",
                             "v_y_bias_mps", "yaw_rate_bias_radps"});
         field<double>("v_x_mean_mps");
+        object("longitudinal", [this] {
+            interval("gain"), interval("delay_s"), interval("lag_s");
+            interval("rolling_resistance_mps2"), interval("drag_1pm");
+            list("limits", [this] {
+                doubles("v_x_mps", {"low", "high"});
+                field<double>("a_max_mps2"), flag("a_max_reached");
+                field<double>("a_min_mps2"), flag("a_min_reached");
+            });
+        });
         close();
         return out_.str();
     }
@@ -107,6 +116,19 @@ private:
     void object(const char* name, Body body) {
         key(name);
         open(), body(), close();
+    }
+    template <class Body>
+    void list(const char* name, Body body) {
+        uint32_t count{};
+        cdr_ >> count;
+        key(name);
+        out_ << '[';
+        for (uint32_t k = 0; k < count; ++k) {
+            if (k > 0) out_ << ',';
+            open(), body(), close();
+        }
+        out_ << ']';
+        first_ = false;
     }
     template <class T>
     void field(const char* name) {

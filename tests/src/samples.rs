@@ -4,7 +4,8 @@ use gripsight_msgs::standard::builtin_interfaces::Time;
 use gripsight_msgs::standard::sensor_msgs::CompressedImage;
 use gripsight_msgs::standard::std_msgs::Header;
 use gripsight_msgs::{
-    Handshake, Interval, MagicFormula, PacejkaParams, PeakFriction, Range, SignalCorrections, StateSequence,
+    Handshake, Interval, Longitudinal, LongitudinalLimit, MagicFormula, PacejkaParams, PeakFriction, Range,
+    SignalCorrections, StateSequence,
 };
 
 /// A parameter set; no two of its numbers are equal, and none is a short decimal.
@@ -21,6 +22,24 @@ pub fn pacejka(seed: u64) -> PacejkaParams {
     let peaks = [interval(), interval()];
     let mut range = || Range { low: next(), high: next() };
     let slip = [range(), range()];
+    let limits_mps = [range(), range()];
+    let mut interval = || Interval { value: next(), low: next(), high: next() };
+    let longitudinal = Longitudinal {
+        gain: interval(),
+        delay_s: interval(),
+        lag_s: interval(),
+        rolling_resistance_mps2: interval(),
+        drag_1pm: interval(),
+        limits: limits_mps
+            .map(|v_x_mps| LongitudinalLimit {
+                v_x_mps,
+                a_max_mps2: next(),
+                a_max_reached: v_x_mps == limits_mps[0],
+                a_min_mps2: next(),
+                a_min_reached: v_x_mps == limits_mps[1],
+            })
+            .to_vec(),
+    };
     PacejkaParams {
         header: header(),
         handshake: handshake(seed),
@@ -49,6 +68,7 @@ pub fn pacejka(seed: u64) -> PacejkaParams {
             yaw_rate_bias_radps: next(),
         },
         v_x_mean_mps: next(),
+        longitudinal,
     }
 }
 

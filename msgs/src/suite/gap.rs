@@ -113,3 +113,25 @@ pub struct GapReport {
 impl Message for GapReport {
     const TYPE: &'static str = "gripsight_msgs/msg/GapReport";
 }
+
+/// The effects that a diagnosis names, for a controller: what its model lacks, and how much. After every verdict; without effects where it names none.
+/// Check a model on the last lap before you drive with it: a name may be wrong.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ExtendedModel {
+    /// Stamp of the last sample diagnosed.
+    pub header: Header,
+    /// The sequence that this is about.
+    pub handshake: Handshake,
+    /// As in [`GapReport`].
+    pub verdict: String,
+    /// Those that the verdict names, with size, interval and probability.
+    pub effects: Vec<GapEffect>,
+    /// Front tires fitted together with the effects: the car's own, not Phi_p.
+    pub front: MagicFormula,
+    /// Rear tires likewise.
+    pub rear: MagicFormula,
+}
+
+impl Message for ExtendedModel {
+    const TYPE: &'static str = "gripsight_msgs/msg/ExtendedModel";
+}

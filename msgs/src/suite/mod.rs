@@ -3,6 +3,7 @@
 mod common;
 mod friction;
 mod gap;
+mod longitudinal;
 mod progress;
 mod residual;
 mod sequence;
@@ -10,7 +11,8 @@ mod tires;
 
 pub use common::{Handshake, Interval, Range};
 pub use friction::FrictionPrior;
-pub use gap::{GapEffect, GapParameter, GapRegion, GapReport};
+pub use gap::{ExtendedModel, GapEffect, GapParameter, GapRegion, GapReport};
+pub use longitudinal::{Longitudinal, LongitudinalLimit};
 pub use progress::IdentificationProgress;
 pub use residual::{Residual, ResidualModel};
 pub use sequence::{Excitation, StateSequence};

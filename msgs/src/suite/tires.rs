@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::standard::std_msgs::Header;
-use crate::{Handshake, Interval, Message, Range};
+use crate::{Handshake, Interval, Longitudinal, Message, Range};
 
 /// Magic Formula of one axle, F_y = F_z D sin(C atan(B alpha - E (B alpha - atan(B alpha)))).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -102,6 +102,8 @@ pub struct PacejkaParams {
     pub signals: SignalCorrections,
     /// Mean forward speed of the sequence (m/s).
     pub v_x_mean_mps: f64,
+    /// What the same drive tells of the drive train.
+    pub longitudinal: Longitudinal,
 }
 
 impl PacejkaParams {

@@ -14,7 +14,7 @@ use tokio::time::MissedTickBehavior;
 
 use crate::diagnostics::{Facts, status};
 use crate::laps::{Lap, Laps};
-use crate::sets::{Said, read};
+use crate::sets::{Said, longitudinal, read};
 use crate::settings::Settings;
 
 /// Depth of the command's queue: only the newest counts.
@@ -100,6 +100,7 @@ impl Wheel {
         match read(message, hash, self.settings.take_provisional.get()) {
             Said::Set(set) => match self.driver.take(set) {
                 Ok(()) => {
+                    self.driver.take_longitudinal(longitudinal(message));
                     self.facts.sets += 1;
                     tracing::info!("{:?}: planning with a grip of {:.3}", set.trust, self.driver.grip());
                 }

@@ -1,7 +1,7 @@
 //! The identifier's messages as the driver takes them.
 
-use gripsight_driving::{Actuator, TireSet, Trust};
-use gripsight_msgs::{MagicFormula as FormulaMessage, PacejkaParams};
+use gripsight_driving::{Actuator, Longitudinal, ReachedAt, TireSet, Trust};
+use gripsight_msgs::{Interval, MagicFormula as FormulaMessage, PacejkaParams};
 use gripsight_vehicle::{MagicFormula, PacejkaParameters};
 
 /// What a message says to a driver.
@@ -43,6 +43,29 @@ pub(crate) fn read(message: &PacejkaParams, vehicle_hash: &str, provisional: boo
     })
 }
 
+/// What a message tells of the drive train, beside the set.
+pub(crate) fn longitudinal(message: &PacejkaParams) -> Longitudinal {
+    let told = &message.longitudinal;
+    let value = |interval: &Interval| Some(interval.value).filter(|v| v.is_finite());
+    let reached = |a: f64, reached: bool| Some(a.abs()).filter(|a| reached && a.is_finite());
+    Longitudinal {
+        gain: value(&told.gain),
+        delay_s: value(&told.delay_s),
+        lag_s: value(&told.lag_s),
+        rolling_resistance_mps2: value(&told.rolling_resistance_mps2),
+        drag_1pm: value(&told.drag_1pm),
+        reached: told
+            .limits
+            .iter()
+            .map(|at| ReachedAt {
+                v_x_mps: [at.v_x_mps.low, at.v_x_mps.high],
+                forward_mps2: reached(at.a_max_mps2, at.a_max_reached),
+                backward_mps2: reached(at.a_min_mps2, at.a_min_reached),
+            })
+            .collect(),
+    }
+}
+
 fn formula(m: &FormulaMessage) -> MagicFormula {
     MagicFormula { b: m.b, c: m.c, d: m.d, e: m.e }
 }
@@ -50,6 +73,7 @@ fn formula(m: &FormulaMessage) -> MagicFormula {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gripsight_msgs::{LongitudinalLimit, Range};
 
     fn message(status: u8) -> PacejkaParams {
         let axle = FormulaMessage { b: 8.0, c: 1.4, d: 0.8, e: 0.0 };
@@ -68,6 +92,21 @@ mod tests {
         assert_eq!((set.actuator.delay_s, set.actuator.gain), (0.0, 1.1));
         assert_eq!(set.grip(), set.tires.front.max_force_within(0.1));
         set.check().unwrap();
+    }
+
+    #[test]
+    fn what_is_not_told_of_the_drive_train_stays_as_stated() {
+        let mut message = message(PacejkaParams::ACCEPTED);
+        for figure in [&mut message.longitudinal.gain, &mut message.longitudinal.drag_1pm] {
+            figure.value = f64::NAN;
+        }
+        message.longitudinal.rolling_resistance_mps2.value = 0.2;
+        let v_x_mps = Range { low: 2.0, high: 4.0 };
+        let limit = LongitudinalLimit { v_x_mps, a_max_mps2: 3.0, a_min_mps2: -5.0, ..Default::default() };
+        message.longitudinal.limits = vec![LongitudinalLimit { a_min_reached: true, ..limit }];
+        let told = longitudinal(&message);
+        assert_eq!((told.gain, told.drag_1pm, told.rolling_resistance_mps2), (None, None, Some(0.2)));
+        assert_eq!((told.reached[0].forward_mps2, told.reached[0].backward_mps2), (None, Some(5.0)));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use gripsight_driving::{CarState, Driver, Drivetrain, Settings as Style, TireSet, Track};
+use gripsight_driving::{CarState, Driver, Drivetrain, Longitudinal, Settings as Style, TireSet, Track};
 use gripsight_msgs::standard::nav_msgs::Odometry;
 use gripsight_runtime::{Descriptor, Node, Parameter, vehicle_parameters};
 use gripsight_vehicle::VehicleParameters;
@@ -51,6 +51,7 @@ impl Settings {
                 "Power of the motor over the car's mass [W/kg]",
             )?,
             top_speed_mps: number("top_speed_mps", 7.0, 0.5, 100.0, "Highest speed to drive [m/s]")?,
+            told: Longitudinal::UNKNOWN,
         };
         let known = Style::default();
         let style = Style {

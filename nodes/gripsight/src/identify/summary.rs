@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use gripsight_identification::{Outcome, Range};
 use gripsight_report::text::{interval, significant, with_interval};
-use gripsight_report::{estimate, peak_friction, status};
+use gripsight_report::{drive_train, estimate, peak_friction, status};
 
 use super::progress::Timing;
 
@@ -23,6 +23,10 @@ pub(super) fn summary(car: &str, result: &Outcome, files: &[PathBuf], timing: &T
         let _ = writeln!(text, "{:<28}{:<32}{}", "peak friction, provisional", d.front, d.rear);
     }
     signals(&mut text, result);
+    text.push('\n');
+    for [title, value] in drive_train(&result.longitudinal) {
+        let _ = writeln!(text, "{title:<28}{value}");
+    }
     let r = &result.rmse;
     let turns = if result.converged { "converged" } else { "not converged" };
     let rows = [

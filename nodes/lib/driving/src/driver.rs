@@ -19,7 +19,7 @@ use crate::progress::Progress;
 use crate::pursuit::{Moment, Pursuit};
 use crate::state::{Asked, CarState, DriveCommand, predict};
 use crate::tires::{TireSet, Trust};
-use crate::{Actuator, DrivingError, Place, Track};
+use crate::{Actuator, DrivingError, Longitudinal, Place, Track};
 
 /// How boldly to drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -165,6 +165,13 @@ impl Driver {
         Ok(())
     }
 
+    /// What identification tells of motor, brakes and resistances: planned and driven with from now on. What it does not tell stays as it was told before,
+    /// else as stated.
+    pub fn take_longitudinal(&mut self, told: Longitudinal) {
+        self.drivetrain.told = told.beside(&self.drivetrain.told);
+        self.renew();
+    }
+
     /// The set in use must not be used any more, or its grip has fallen. `share`: what the road gives of what the set promises, where it is known.
     pub fn warn(&mut self, share: Option<f64>) {
         let promised = self.known.as_ref().unwrap_or(&self.start).grip();
@@ -268,7 +275,13 @@ impl Driver {
         let most = self.vehicle.max_steering_rad;
         let angle_rad = self.settings.pursuit.steering_rad(&moment, &mut self.trim_rad).clamp(-most, most);
         let (speed_mps, acceleration_mps2) = self.longitudinal(state, place, angle_rad);
-        let asked = Asked { from_s, angle_rad, acceleration_mps2 };
+        let told = &self.plan.limits.told;
+        let asked = Asked {
+            from_s,
+            angle_rad,
+            acceleration_mps2: acceleration_mps2 - told.resistance_mps2(state.v_x_mps),
+        };
+        let acceleration_mps2 = acceleration_mps2 / told.gain();
         self.asked.push_back(asked);
         while self.asked.front().is_some_and(|a| a.from_s < state.stamp_s - 2.0 * LATEST_S) {
             self.asked.pop_front();
@@ -288,15 +301,21 @@ impl Driver {
         let width = if place.offset_m > 0.0 { point.left_m } else { point.right_m };
         let wide = (place.offset_m.abs() / width - WIDE).max(0.0);
         let room = (1.0 - 0.5 * wide).max(0.5);
-        let (speed_mps, slope) = self.plan.profile.at(place.station_m);
+        // A command acts later: it is meant for where the car then is.
+        let ahead_m = limits.told.ahead_s() * state.v_x_mps;
+        let (speed_mps, slope) = self.plan.profile.at(place.station_m + ahead_m);
         let speed_mps = speed_mps * room;
         let turned = state.v_x_mps * state.yaw_rate_radps;
         // Front tires that steer and a body that slides sideways hold the car back.
         let slide = -state.v_y_mps * state.yaw_rate_radps;
         let scrub = slide.clamp(-SLIDE_MPS2, SLIDE_MPS2)
             + (self.vehicle.l_r_m / self.vehicle.wheelbase_m() * turned * angle_rad.sin()).max(0.0);
-        let wanted = slope * room + scrub + self.settings.speed_gain_1ps * (speed_mps - state.v_x_mps);
         let left = limits.left_beside(turned);
+        // What holds the car back is made up for where it gains speed. Tires at their limit sideways have nothing left for it, and a car that is
+        // slower than planned where it brakes has room for a corner.
+        let resisted = if slope > 0.0 { left * limits.told.resistance_mps2(state.v_x_mps) } else { 0.0 };
+        let wanted =
+            slope * room + scrub + resisted + self.settings.speed_gain_1ps * (speed_mps - state.v_x_mps);
         let drive =
             limits.drive_at_mps2(state.v_x_mps) * left.max(LEAST_DRIVE) * if wide > 0.0 { 0.5 } else { 1.0 };
         // Whoever is too fast for a plan that was taken back has more to brake with than it says beside the turning.

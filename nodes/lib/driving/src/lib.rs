@@ -6,6 +6,7 @@
 mod driver;
 mod error;
 mod governor;
+mod longitudinal;
 mod plan;
 mod profile;
 mod progress;
@@ -17,6 +18,7 @@ mod track;
 
 pub use driver::{Driver, Settings};
 pub use error::DrivingError;
+pub use longitudinal::{Longitudinal, ReachedAt};
 pub use profile::{Drivetrain, Limits, SpeedProfile};
 pub use pursuit::{Moment, Pursuit};
 pub use state::{CarState, DriveCommand};

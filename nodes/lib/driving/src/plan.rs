@@ -9,6 +9,9 @@ use crate::tires::{SteeringTable, with_peak};
 /// Share of the tires' peak that steering counts on however little is planned.
 const STEERS: f64 = 0.7;
 
+/// Share of the peak that steering counts on at most to plan with, where that peak is not known.
+const ROOM: f64 = 0.9;
+
 /// What is planned with.
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
@@ -28,9 +31,11 @@ impl Plan {
         tires: &PacejkaParameters,
         grip: f64,
     ) -> Self {
-        let peak = tires.front.d.min(tires.rear.d).max(grip);
+        let known = tires.front.d.min(tires.rear.d);
+        // A plan beyond what the set promises is steered with some room above it, too.
+        let peak = if grip > known { grip / ROOM } else { known };
         // A car that is faster than a plan that was taken back still needs all that its tires give.
-        let tires = with_peak(tires, peak.min((grip / 0.9).max(STEERS * peak)));
+        let tires = with_peak(tires, peak.min((grip / ROOM).max(STEERS * peak)));
         let limits = Limits::new(vehicle, grip, drivetrain);
         Self {
             profile: SpeedProfile::new(track, &limits),

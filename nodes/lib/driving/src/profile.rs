@@ -9,13 +9,16 @@
 
 use gripsight_vehicle::{GRAVITY_MPS2, VehicleParameters};
 
-use crate::Track;
+use crate::{Longitudinal, Track};
 
 /// Share of the tires' longitudinal limit to plan with: rolling loads and the speed controller need the rest.
 const LONGITUDINAL_SHARE: f64 = 0.85;
 
-/// What motor and brakes can do: stated, where nobody identified it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A car that its drag would stop is still driven.
+const SLOWEST_MPS: f64 = 0.2;
+
+/// What motor and brakes can do: as stated, and what identification tells beside it.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Drivetrain {
     /// Largest acceleration.
     pub drive_mps2: f64,
@@ -25,10 +28,12 @@ pub struct Drivetrain {
     pub power_w_per_kg: f64,
     /// Highest speed to drive.
     pub top_speed_mps: f64,
+    /// What identification tells.
+    pub told: Longitudinal,
 }
 
 /// Accelerations that the car may use.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Limits {
     /// Sideways.
     pub lateral_mps2: f64,
@@ -40,6 +45,8 @@ pub struct Limits {
     pub power_w_per_kg: f64,
     /// Highest speed.
     pub top_speed_mps: f64,
+    /// Gain, resistances and limits that were reached.
+    pub told: Longitudinal,
 }
 
 impl Limits {
@@ -65,6 +72,7 @@ impl Limits {
             brake_mps2: most(vehicle.front_brake_share(), shift).min(drivetrain.brake_mps2),
             power_w_per_kg: drivetrain.power_w_per_kg,
             top_speed_mps: drivetrain.top_speed_mps,
+            told: drivetrain.told.clone(),
         }
     }
 
@@ -75,10 +83,24 @@ impl Limits {
         (1.0 - used * used).sqrt()
     }
 
-    /// Largest driving acceleration at a speed.
+    /// Largest driving acceleration at a speed, of tires and motor: what holds the car back is not off it.
     #[must_use]
     pub fn drive_at_mps2(&self, speed_mps: f64) -> f64 {
         self.drive_mps2.min(self.power_w_per_kg / speed_mps.max(0.1))
+    }
+
+    /// Speed gained a second at most, beside a lateral acceleration: what holds the car back is made up for by the driver.
+    #[must_use]
+    pub fn gains_mps2(&self, speed_mps: f64, lateral_mps2: f64) -> f64 {
+        let pushed = self.drive_at_mps2(speed_mps) * self.left_beside(lateral_mps2);
+        pushed.min(self.told.reached_mps2(speed_mps)[0])
+    }
+
+    /// Speed lost a second at most, beside a lateral acceleration: what holds the car back helps, and is kept as room.
+    #[must_use]
+    pub fn loses_mps2(&self, speed_mps: f64, lateral_mps2: f64) -> f64 {
+        let braked = self.brake_mps2 * self.left_beside(lateral_mps2);
+        braked.min(self.told.reached_mps2(speed_mps)[1])
     }
 }
 
@@ -102,13 +124,14 @@ impl SpeedProfile {
         for i in 0..2 * count {
             let (here, next) = (i % count, (i + 1) % count);
             let v = speeds_mps[here];
-            let a = limits.drive_at_mps2(v) * limits.left_beside(v * v * curvature[here]);
-            speeds_mps[next] = speeds_mps[next].min((v * v + 2.0 * a * step_m).sqrt());
+            let a = limits.gains_mps2(v, v * v * curvature[here]);
+            speeds_mps[next] =
+                speeds_mps[next].min((v * v + 2.0 * a * step_m).max(SLOWEST_MPS.powi(2)).sqrt());
         }
         for i in (0..2 * count).rev() {
             let (here, next) = (i % count, (i + 1) % count);
             let v = speeds_mps[next];
-            let a = limits.brake_mps2 * limits.left_beside(v * v * curvature[next]);
+            let a = limits.loses_mps2(v, v * v * curvature[next]);
             speeds_mps[here] = speeds_mps[here].min((v * v + 2.0 * a * step_m).sqrt());
         }
         Self { speeds_mps, step_m }
@@ -137,6 +160,7 @@ impl SpeedProfile {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ReachedAt;
 
     fn limits() -> Limits {
         Limits {
@@ -145,6 +169,7 @@ mod tests {
             brake_mps2: 6.0,
             power_w_per_kg: 60.0,
             top_speed_mps: 12.0,
+            told: Longitudinal::UNKNOWN,
         }
     }
 
@@ -195,6 +220,7 @@ mod tests {
             brake_mps2: lateral_mps2,
             power_w_per_kg: f64::INFINITY,
             top_speed_mps: 100.0,
+            told: Longitudinal::UNKNOWN,
         };
         let time = |a: f64| SpeedProfile::new(&track, &strong(a)).lap_time_s();
         approx::assert_relative_eq!(time(4.0) / time(8.0), 2.0_f64.sqrt(), max_relative = 1e-3);
@@ -207,6 +233,7 @@ mod tests {
             brake_mps2: 100.0,
             power_w_per_kg: f64::INFINITY,
             top_speed_mps: 50.0,
+            told: Longitudinal::UNKNOWN,
         };
         let limit = |drive_front_share: f64| {
             let vehicle = VehicleParameters {
@@ -221,5 +248,23 @@ mod tests {
             LONGITUDINAL_SHARE * 0.8 * GRAVITY_MPS2 * car.l_r_m / (car.wheelbase_m() + 0.8 * car.h_cg_m);
         approx::assert_relative_eq!(limit(1.0), by_hand, max_relative = 1e-9);
         assert!(limit(0.0) > limit(1.0));
+    }
+
+    #[test]
+    fn what_identification_tells_is_planned_with() {
+        let track = stadium();
+        let told = |told: Longitudinal| SpeedProfile::new(&track, &Limits { told, ..limits() });
+        let stated = told(Longitudinal::UNKNOWN);
+        // A motor that gives less than is stated at some speeds.
+        let weak = ReachedAt { v_x_mps: [6.0, 20.0], forward_mps2: Some(1.5), backward_mps2: Some(2.0) };
+        let weak = told(Longitudinal { reached: vec![weak], ..Longitudinal::UNKNOWN });
+        let steepest = |p: &SpeedProfile| {
+            let places = (0..track.points().len()).map(|k| p.at(k as f64 * track.step_m()));
+            let fast = places.filter(|(v, _)| *v > 6.3).map(|(_, a)| a);
+            fast.fold((0.0_f64, 0.0_f64), |(up, down), a| (up.max(a), down.min(a)))
+        };
+        let ((up, down), (weak_up, weak_down)) = (steepest(&stated), steepest(&weak));
+        assert!(up > 3.0 && down < -5.0, "{up} {down}");
+        assert!(weak_up < 1.55 && weak_down > -2.05, "{weak_up} {weak_down}");
     }
 }

@@ -1,8 +1,10 @@
 //! Identification's types as messages and back: candidates, residual models, outcomes. Numbers survive bit for bit.
 
+mod longitudinal;
+
 use gripsight_identification::{
-    Candidate, Estimate, FrictionPrior, INPUTS, IdentificationError, LiveSample, OUTPUTS, Outcome,
-    PeakFriction, Range, ResidualKind, ResidualModel, RunKey, SignalCorrections, Status,
+    Candidate, Estimate, FrictionPrior, INPUTS, IdentificationError, LiveSample, Longitudinal, OUTPUTS,
+    Outcome, PeakFriction, Range, ResidualKind, ResidualModel, RunKey, SignalCorrections, Status,
 };
 use gripsight_msgs as msg;
 use gripsight_vehicle::{
@@ -60,6 +62,7 @@ pub fn proposed(candidate: &Candidate, vehicle: &VehicleParameters) -> msg::Pace
         rear_valid_force_n: f64::NAN,
         signals: signals(&candidate.corrections),
         v_x_mean_mps: candidate.mean_speed_mps,
+        longitudinal: longitudinal::message(&Longitudinal::default()),
     }
 }
 
@@ -136,6 +139,7 @@ pub fn result(outcome: &Outcome) -> msg::PacejkaParams {
         rear_valid_force_n: valid.force_n.rear,
         signals: signals(&outcome.signals),
         v_x_mean_mps: outcome.mean_speed_mps,
+        longitudinal: longitudinal::message(&outcome.longitudinal),
     }
 }
 

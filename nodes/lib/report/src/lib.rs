@@ -37,7 +37,9 @@ pub use error::ReportError;
 #[cfg(feature = "gap")]
 pub use gap::{Before, GapInput, gap_page, gap_text};
 #[cfg(feature = "identification")]
-pub use identification::{IdentificationInput, estimate, identification_page, peak_friction, status};
+pub use identification::{
+    IdentificationInput, drive_train, estimate, identification_page, peak_friction, status,
+};
 pub use page::Header;
 pub use role::Role;
 #[cfg(feature = "simulator")]

@@ -6,9 +6,9 @@
 use std::f64::consts::TAU;
 
 use gripsight_identification::{
-    Change, Config, Estimate, FrictionPrior, HorizonError, IterationRecord, Longitudinal, Nuisance, Outcome,
-    PeakFriction, PerAxle, ProvisionalSet, Range, Recorded, Rmse, RmseReport, RunKey, SignalCorrections,
-    SignalEstimates, Source, Status, TireCurve, Trace, ValidWithin, WeakSignal,
+    Change, Config, Estimate, FrictionPrior, Given, HorizonError, IterationRecord, LimitsAt, Longitudinal,
+    Nuisance, Outcome, PeakFriction, PerAxle, ProvisionalSet, Range, Recorded, Rmse, RmseReport, RunKey,
+    SignalCorrections, SignalEstimates, Source, Status, TireCurve, Told, Trace, ValidWithin, WeakSignal,
 };
 use gripsight_report::{Header, IdentificationInput, identification_page};
 use gripsight_signals::DataHealth;
@@ -218,6 +218,20 @@ fn the_verdict_says_what_the_figures_rest_on() {
         html.contains("<h1 class=\"caution\">Not accepted: the peak was not reached and there is no prior.")
     );
     assert!(html.contains("front unknown, peak not reached"));
+}
+
+#[test]
+fn the_drive_train_is_shown_with_what_is_unknown() {
+    let mut told = outcome();
+    told.longitudinal.gain = Told::Known(Estimate { value: 0.96, low: 0.93, high: 0.99 });
+    let given = |value: f64, reached: bool| Some(Given { value, reached });
+    let v_x_mps = Range { low: 1.0, high: 2.5 };
+    told.longitudinal.limits =
+        vec![LimitsAt { v_x_mps, a_max_mps2: given(4.0, true), a_min_mps2: given(-6.5, false) }];
+    let html = page(&told);
+    for part in ["0.960 (0.930 … 0.990)", "drag 1/m</td><td>unknown", "4.0 reached, −6.5 shown"] {
+        assert!(html.contains(part), "{part}");
+    }
 }
 
 #[test]

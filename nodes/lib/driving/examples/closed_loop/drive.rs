@@ -39,7 +39,8 @@ impl Loop {
         let drivetrain = plant::drivetrain(&case.car);
         let track = plant::track(&case.car, &case.track, reversed)?;
         let limits = Limits::new(&vehicle, truth(case.tires).grip(), &drivetrain);
-        let driver = Driver::new(vehicle.clone(), drivetrain, track.clone(), start, Settings::default())?;
+        let driver =
+            Driver::new(vehicle.clone(), drivetrain.clone(), track.clone(), start, Settings::default())?;
         let course = Course::Track { name: case.track.clone(), reversed };
         let mut scenario = plant::scenario(&case.car, course, case.mu, case.seed);
         scenario.driver.pace = (0.25 / case.mu).min(1.0);

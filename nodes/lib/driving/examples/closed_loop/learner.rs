@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 
 use anyhow::Result;
-use gripsight_driving::{Actuator, Driver, TireSet, Trust};
+use gripsight_driving::{Actuator, Driver, Longitudinal, ReachedAt, TireSet, Trust};
 use gripsight_identification::{
-    AcceptedSet, Config, FrictionPrior, GripWatch, Outcome, ResidualKind, Status, identify,
+    AcceptedSet, Config, FrictionPrior, Given, GripWatch, Outcome, ResidualKind, Status, Told, identify,
 };
 use gripsight_reference_car::SensorSample;
 use gripsight_signals::{AlignConfig, Aligner, StateSequence, TelemetrySample};
@@ -103,10 +103,33 @@ impl Learner {
             self.in_use = outcome.accepted_set();
             self.watch = self.in_use.as_ref().map(|set| GripWatch::new(&self.vehicle, set)).transpose()?;
         }
+        driver.take_longitudinal(told(&outcome.longitudinal));
         if let Some(set) = &outcome.provisional {
             take(driver, &outcome, &set.phi_p, Trust::Provisional, verbose);
         }
         Ok(())
+    }
+}
+
+/// What the message says of the drive train.
+fn told(found: &gripsight_identification::Longitudinal) -> Longitudinal {
+    let value = |told: &Told| told.known().map(|e| e.value);
+    let reached = |given: Option<Given>| given.filter(|g| g.reached).map(|g| g.value.abs());
+    Longitudinal {
+        gain: value(&found.gain),
+        delay_s: value(&found.delay_s),
+        lag_s: value(&found.lag_s),
+        rolling_resistance_mps2: value(&found.rolling_resistance_mps2),
+        drag_1pm: value(&found.drag_1pm),
+        reached: found
+            .limits
+            .iter()
+            .map(|at| ReachedAt {
+                v_x_mps: [at.v_x_mps.low, at.v_x_mps.high],
+                forward_mps2: reached(at.a_max_mps2),
+                backward_mps2: reached(at.a_min_mps2),
+            })
+            .collect(),
     }
 }
 

@@ -1,7 +1,7 @@
 //! The reference car, its track, and its tires projected on Phi_p.
 
 use anyhow::{Context, Result};
-use gripsight_driving::{Drivetrain, Track};
+use gripsight_driving::{Drivetrain, Longitudinal, Track};
 use gripsight_identification::nelder_mead::{NelderMeadConfig, minimize};
 use gripsight_identification::tires::BOUNDS;
 use gripsight_reference_car as reference;
@@ -20,6 +20,21 @@ pub(crate) fn drivetrain(car: &CarParameters) -> Drivetrain {
         brake_mps2: car.drive.brake_limit * reference::GRAVITY_MPS2,
         power_w_per_kg: car.drive.power_w / car.mass_kg,
         top_speed_mps: car.top_speed_mps,
+        told: Longitudinal::UNKNOWN,
+    }
+}
+
+/// What holds a built-in car back on a road: what a driver on its true tires is told.
+pub(crate) fn told(car: &CarParameters, mu: f64) -> Longitudinal {
+    let effects = car.own_effects(mu);
+    let of = |name: &str, parameter: &str| {
+        let effect = effects.iter().find(|e| e.name == name);
+        effect.and_then(|e| e.parameters.get(parameter)).copied()
+    };
+    Longitudinal {
+        rolling_resistance_mps2: of("rolling_resistance", "c").map(|c| c * reference::GRAVITY_MPS2),
+        drag_1pm: of("aero_drag", "c_1pm"),
+        ..Longitudinal::UNKNOWN
     }
 }
 

@@ -10,6 +10,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::drive::{Loop, truth};
 use crate::learner::Learner;
+use crate::plant;
 use crate::referee::Lap;
 
 /// What the driver may know.
@@ -85,6 +86,9 @@ pub(crate) struct Run {
 pub(crate) fn drive(case: &Case, variant: Variant, verbose: bool) -> Result<Run> {
     let start = if variant == Variant::True { truth(case.tires) } else { TireSet::start() };
     let mut run = Loop::new(case, start, &[], verbose)?;
+    if variant == Variant::True {
+        run.driver.take_longitudinal(plant::told(&case.car, case.mu));
+    }
     if !matches!(variant, Variant::None | Variant::True) {
         run.learner = Some(Learner::new(run.vehicle.clone(), variant.prior(case.mu, case.seed)));
     }

@@ -1,12 +1,17 @@
 //! The driver on a single-track car: what it does with sets, warnings, delays and less grip than planned.
 
 use gripsight_driving::{
-    Actuator, CarState, DriveCommand, Driver, Drivetrain, Settings, TireSet, Track, Trust,
+    Actuator, CarState, DriveCommand, Driver, Drivetrain, Longitudinal, Settings, TireSet, Track, Trust,
 };
 use gripsight_vehicle::{Input, MagicFormula, PacejkaParameters, SingleTrack, State, VehicleParameters};
 
-const DRIVETRAIN: Drivetrain =
-    Drivetrain { drive_mps2: 6.0, brake_mps2: 8.0, power_w_per_kg: 60.0, top_speed_mps: 8.0 };
+const DRIVETRAIN: Drivetrain = Drivetrain {
+    drive_mps2: 6.0,
+    brake_mps2: 8.0,
+    power_w_per_kg: 60.0,
+    top_speed_mps: 8.0,
+    told: Longitudinal::UNKNOWN,
+};
 
 /// A bean of about 60 m.
 fn track() -> Track {
@@ -102,6 +107,42 @@ fn a_known_delay_is_made_up_for() {
     let with = drive(&mut driver(told(DELAY_S)), |_| 0.8, DELAY_S, 25.0);
     let without = drive(&mut driver(told(0.0)), |_| 0.8, DELAY_S, 25.0);
     assert!(with < 0.25 && with < 0.6 * without, "{with} m with the delay known, {without} m without");
+}
+
+#[test]
+fn a_drive_train_that_gives_less_is_asked_for_more() {
+    let told = Longitudinal {
+        gain: Some(0.8),
+        rolling_resistance_mps2: Some(0.3),
+        drag_1pm: Some(0.01),
+        ..Longitudinal::UNKNOWN
+    };
+    // On the line, as fast as planned: braking for a corner, then gaining speed out of one.
+    let asked = |told: Option<Longitudinal>, gains: bool| {
+        let mut driver = driver(set(0.8, Trust::Accepted));
+        told.into_iter().for_each(|told| driver.take_longitudinal(told));
+        let slope = |s: &f64| driver.profile().at(*s).1;
+        let mut places = (0..600).map(|k| f64::from(k) * 0.1);
+        let gentle = if gains { 0.1..1.5 } else { -1.5..-0.5 };
+        let station_m = places.find(|s| gentle.contains(&slope(s))).unwrap();
+        let (at, (v_x_mps, _)) = (driver.track().at(station_m), driver.profile().at(station_m));
+        let car = CarState {
+            stamp_s: 0.0,
+            x_m: at.x_m,
+            y_m: at.y_m,
+            heading_rad: at.heading_rad,
+            v_x_mps,
+            v_y_mps: 0.0,
+            yaw_rate_radps: 0.0,
+        };
+        (driver.command(&car, 0.0).acceleration_mps2, v_x_mps)
+    };
+    let (braked, _) = asked(None, false);
+    approx::assert_relative_eq!(asked(Some(told.clone()), false).0, braked / 0.8, max_relative = 1e-9);
+    let (driven, v) = asked(None, true);
+    // The car goes straight: no share of the grip is needed for turning.
+    let expected = (driven + 0.3 + 0.01 * v * v) / 0.8;
+    approx::assert_relative_eq!(asked(Some(told), true).0, expected, max_relative = 1e-9);
 }
 
 #[test]

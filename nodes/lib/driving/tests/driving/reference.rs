@@ -1,6 +1,6 @@
 //! The driver on the reference car, which shares no model with it.
 
-use gripsight_driving::{CarState, Driver, Drivetrain, Settings, TireSet, Track, Trust};
+use gripsight_driving::{CarState, Driver, Drivetrain, Longitudinal, Settings, TireSet, Track, Trust};
 use gripsight_reference_car as reference;
 use gripsight_reference_car::{CarParameters, Command, Course, Friction, Scenario, SensorSample, Simulation};
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
@@ -22,6 +22,7 @@ fn on_its_projected_tires_the_1_10_car_stays_on_the_track() {
         brake_mps2: car.drive.brake_limit * 9.81,
         power_w_per_kg: car.drive.power_w / car.mass_kg,
         top_speed_mps: car.top_speed_mps,
+        told: Longitudinal::UNKNOWN,
     };
     let mut driver = Driver::new(vehicle, drivetrain, track, set, Settings::default()).unwrap();
     let course = Course::Track { name: "club".to_owned(), reversed: false };

@@ -7,7 +7,7 @@ mod words;
 use gripsight_identification::{Method, Outcome, PerAxle, Source, Status};
 use maud::html;
 
-pub use words::{estimate, peak_friction, status};
+pub use words::{drive_train, estimate, peak_friction, status};
 
 use crate::page::{Tone, figure, list, page, section};
 use crate::text::{fixed, percent, significant, with_interval};
@@ -53,6 +53,8 @@ pub fn identification_page(input: &IdentificationInput<'_>) -> Result<String, Re
         }
         (section(tires, false, &tables::tires(outcome)))
         @if fitted { (section("Taken out of the signals", false, &tables::signals(outcome))) }
+
+        (section("Drive train", false, &tables::longitudinal(outcome)))
         (section("What limits the result", false, &list(&outcome.reasons, "Nothing that was found.")))
         (section("Drive next", false, &list(&outcome.drive_next, "Nothing in particular.")))
         @if drawn {

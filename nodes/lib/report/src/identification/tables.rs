@@ -3,7 +3,7 @@
 use gripsight_identification::{Outcome, PeakFriction, PerAxle, Range};
 use maud::{Markup, html};
 
-use super::words::{estimate, peak_friction};
+use super::words::{drive_train, estimate, peak_friction};
 use crate::health::health;
 use crate::page::{facts_table, list, table};
 use crate::text::{fixed, interval, percent, significant, with_interval};
@@ -75,6 +75,14 @@ pub(super) fn signals(outcome: &Outcome) -> Markup {
         [title.to_owned(), value, interval, rests]
     });
     table(["", "Value", "90 %", "Rests on"], &rows)
+}
+
+/// What the drive tells of motor, brakes and resistances.
+pub(super) fn longitudinal(outcome: &Outcome) -> Markup {
+    html! {
+        (table(["", "Value (90 %)"], &drive_train(&outcome.longitudinal)))
+        p { "Reached: more was asked for and not given. Shown: the largest that was asked for was given." }
+    }
 }
 
 /// Errors before and after.

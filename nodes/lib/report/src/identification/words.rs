@@ -1,8 +1,10 @@
 //! What an identification found, in words that page and terminal share.
 
-use gripsight_identification::{Estimate, Outcome, PeakFriction, Status};
+use gripsight_identification::{
+    Estimate, Given, LimitsAt, Longitudinal, Outcome, PeakFriction, Status, Told,
+};
 
-use crate::text::{estimate_of, fixed};
+use crate::text::{estimate_of, fixed, interval};
 
 /// An estimate with its interval behind it.
 #[must_use]
@@ -31,4 +33,34 @@ pub fn peak_friction(peak: &PeakFriction) -> String {
     } else {
         "not reached".to_owned()
     }
+}
+
+/// What a drive tells of the drive train, a line each: what it is and what was found.
+#[must_use]
+pub fn drive_train(found: &Longitudinal) -> Vec<[String; 2]> {
+    let figures = [
+        ("acceleration over command", &found.gain),
+        ("drive delay s", &found.delay_s),
+        ("drive lag s", &found.lag_s),
+        ("rolling resistance m/s2", &found.rolling_resistance_mps2),
+        ("drag 1/m", &found.drag_1pm),
+    ];
+    let figures = figures.map(|(title, told)| {
+        let value = match told {
+            Told::Known(e) => estimate(e),
+            Told::Unknown => "unknown".to_owned(),
+        };
+        [title.to_owned(), value]
+    });
+    let given = |given: Option<Given>| match given {
+        None => "none asked".to_owned(),
+        Some(Given { value, reached }) => {
+            format!("{} {}", fixed(value, 1), if reached { "reached" } else { "shown" })
+        }
+    };
+    let limit = |at: &LimitsAt| {
+        let speeds = interval(at.v_x_mps.low, at.v_x_mps.high);
+        [format!("m/s2 at {speeds} m/s"), format!("{}, {}", given(at.a_max_mps2), given(at.a_min_mps2))]
+    };
+    figures.into_iter().chain(found.limits.iter().map(limit)).collect()
 }
