@@ -18,6 +18,9 @@ pub(crate) struct Facts {
     pub(crate) held_back: bool,
     /// Why the last set was not taken.
     pub(crate) refused: Option<String>,
+    /// The last extended model taken, and why the last one was not.
+    pub(crate) model: String,
+    pub(crate) model_refused: Option<String>,
     /// Sets taken, and what the one in use rests on.
     pub(crate) sets: u32,
     pub(crate) rests_on: &'static str,
@@ -32,6 +35,8 @@ pub(crate) fn status(facts: &Facts) -> Status {
         (Level::Warn, format!("off the track by {outside_m:.2} m"))
     } else if let Some(why) = &facts.refused {
         (Level::Warn, format!("the last set was not taken: {why}"))
+    } else if let Some(why) = &facts.model_refused {
+        (Level::Warn, format!("the extended model was not taken: {why}"))
     } else if facts.held_back {
         let text =
             format!("held back to a grip of {:.2}: the road gave less than the set promises", facts.grip);
@@ -45,7 +50,8 @@ pub(crate) fn status(facts: &Facts) -> Status {
         .value("grip planned (g)", format!("{:.3}", facts.grip))
         .value("age of the odometry (s)", format!("{:.3}", facts.age_s))
         .value("sets taken", facts.sets)
-        .value("tires", facts.rests_on);
+        .value("tires", facts.rests_on)
+        .value("extended model", if facts.model.is_empty() { "none" } else { &facts.model });
     match &facts.last_lap {
         None => status,
         Some(lap) => status
@@ -69,6 +75,7 @@ mod tests {
             (Facts { blind: true, ..driving.clone() }, Level::Error, "braking"),
             (Facts { outside_m: Some(0.12), ..driving.clone() }, Level::Warn, "off the track by 0.12 m"),
             (Facts { refused: Some("of another car".into()), ..driving.clone() }, Level::Warn, "another car"),
+            (Facts { model_refused: Some("no better".into()), ..driving.clone() }, Level::Warn, "no better"),
             (Facts { held_back: true, ..driving.clone() }, Level::Warn, "grip of 0.80"),
             (Facts { sets: 0, ..driving }, Level::Warn, "start's tires"),
         ];

@@ -2,6 +2,7 @@
 
 mod diagnostics;
 mod laps;
+mod model;
 mod node;
 mod sets;
 mod settings;

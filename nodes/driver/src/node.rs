@@ -8,12 +8,13 @@ use gripsight_identification::vehicle_hash;
 use gripsight_msgs::standard::ackermann_msgs::{AckermannDrive, AckermannDriveStamped};
 use gripsight_msgs::standard::nav_msgs::Odometry;
 use gripsight_msgs::standard::std_msgs::Header;
-use gripsight_msgs::{Grip, PacejkaParams};
+use gripsight_msgs::{ExtendedModel, Grip, PacejkaParams};
 use gripsight_runtime::{Clock, Diagnostics, Node, Publisher, Qos};
 use tokio::time::MissedTickBehavior;
 
 use crate::diagnostics::{Facts, status};
 use crate::laps::{Lap, Laps};
+use crate::model::{self, Tried};
 use crate::sets::{Said, longitudinal, read};
 use crate::settings::Settings;
 
@@ -27,6 +28,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
     let (settings, driver) = Settings::declare(node)?;
     let mut odometry = node.subscription::<Odometry>("odom", node.sensor_qos(DEPTH))?;
     let mut sets = node.subscription::<PacejkaParams>("pacejka", Qos::latched())?;
+    let mut models = node.subscription::<ExtendedModel>("extended_model", Qos::latched())?;
     let mut grips = node.subscription::<Grip>("grip", Qos::latched())?;
     node.needs([odometry.arrivals()]);
     let hash = vehicle_hash(&settings.vehicle);
@@ -52,6 +54,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
             tokio::select! {
                 Some(message) = odometry.next() => wheel.steer(&message).await,
                 Some(message) = sets.next() => wheel.take(&message, &hash),
+                Some(message) = models.next() => wheel.try_model(&message, &hash),
                 Some(message) = grips.next() => wheel.feel(&message, &hash),
                 _ = ticks.tick() => wheel.look().await,
                 else => return Ok(()),
@@ -122,6 +125,20 @@ impl Wheel {
     fn refuse(&mut self, why: String) {
         tracing::warn!("set not taken: {why}");
         self.facts.refused = Some(why);
+    }
+
+    fn try_model(&mut self, message: &ExtendedModel, hash: &str) {
+        match model::take(&mut self.driver, message, hash) {
+            Tried::Nothing => self.facts.model_refused = None,
+            Tried::Taken(said) => {
+                tracing::info!("the extended model is taken: {said}");
+                (self.facts.model, self.facts.model_refused) = (said, None);
+            }
+            Tried::Refused(why) => {
+                tracing::warn!("the extended model is not taken: {why}");
+                self.facts.model_refused = Some(why);
+            }
+        }
     }
 
     fn feel(&mut self, message: &Grip, hash: &str) {

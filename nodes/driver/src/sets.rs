@@ -39,6 +39,7 @@ pub(crate) fn read(message: &PacejkaParams, vehicle_hash: &str, provisional: boo
             delay_s: signals.steering_delay_s.max(0.0),
             gain: signals.steering_gain,
             offset_rad: signals.steering_offset_rad,
+            ..Actuator::default()
         },
     })
 }

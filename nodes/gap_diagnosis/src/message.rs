@@ -4,7 +4,9 @@ use gripsight_bag::encode;
 use gripsight_diagnosis::{Diagnosis, Place, RankedEffect};
 use gripsight_estimation::Estimate;
 use gripsight_msgs::standard::std_msgs::Header;
-use gripsight_msgs::{GapEffect, GapParameter, GapRegion, GapReport, Handshake, Interval, MagicFormula};
+use gripsight_msgs::{
+    ExtendedModel, GapEffect, GapParameter, GapRegion, GapReport, Handshake, Interval, MagicFormula,
+};
 use gripsight_signals::{DataHealth, StateSequence};
 
 /// Bins of the message at most; the files have all.
@@ -43,6 +45,18 @@ pub(crate) fn report(
         data_health: health(&diagnosis.data_health),
         drive_next: diagnosis.drive_next.clone(),
         report_directory,
+    }
+}
+
+/// What a controller takes of it: the effects that the verdict names.
+pub(crate) fn extended_model(diagnosis: &Diagnosis, report: &GapReport) -> ExtendedModel {
+    ExtendedModel {
+        header: report.header.clone(),
+        handshake: report.handshake.clone(),
+        verdict: report.verdict.clone(),
+        effects: diagnosis.effects.iter().filter(|e| e.accepted).map(effect).collect(),
+        front: report.front_with_effect,
+        rear: report.rear_with_effect,
     }
 }
 

@@ -11,7 +11,9 @@ use gripsight_diagnosis::{Diagnosis, Request, diagnose};
 use gripsight_identification::export::stamp_text;
 use gripsight_identification::{Usable, vehicle_hash};
 use gripsight_identification_messages as messages;
-use gripsight_msgs::{GapReport, StateSequence as SequenceMessage, TirePosterior as PosteriorMessage};
+use gripsight_msgs::{
+    ExtendedModel, GapReport, StateSequence as SequenceMessage, TirePosterior as PosteriorMessage,
+};
 use gripsight_report::Header;
 use gripsight_runtime::{
     Descriptor, Diagnostics, Node, Parameter, Publisher, Qos, Subscription, vehicle_parameters,
@@ -45,6 +47,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
     let sequences = node.subscription::<SequenceMessage>("sequence", Qos::latched().with_depth(64))?;
     let tires = node.subscription::<PosteriorMessage>("posterior", Qos::latched())?;
     let output = node.publisher::<GapReport>("~/report", Qos::latched())?;
+    let model = node.publisher::<ExtendedModel>("~/extended_model", Qos::latched())?;
     let diagnostics = node.diagnostics();
 
     Ok(async move {
@@ -57,7 +60,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
         });
         let (newest, sequence) = watch::channel(None);
         let (known, tires_known) = watch::channel(None);
-        let diagnoser = Diagnoser { vehicle, report_folder, without, output, facts: &facts };
+        let diagnoser = Diagnoser { vehicle, report_folder, without, output, model, facts: &facts };
         tokio::select! {
             () = collect_sequences(sequences, newest, &facts) => {}
             () = collect_tires(tires, known, &diagnoser.vehicle, &facts) => {}
@@ -120,6 +123,7 @@ struct Diagnoser<'a> {
     report_folder: Parameter<String>,
     without: Parameter<Vec<String>>,
     output: Publisher<GapReport>,
+    model: Publisher<ExtendedModel>,
     facts: &'a RefCell<Facts>,
 }
 
@@ -197,7 +201,9 @@ impl Diagnoser<'_> {
                 String::new()
             }
         };
-        self.output.publish(&message::report(diagnosis, sequence, &hash, directory)).await;
+        let report = message::report(diagnosis, sequence, &hash, directory);
+        self.output.publish(&report).await;
+        self.model.publish(&message::extended_model(diagnosis, &report)).await;
         let because = diagnosis.reasons.first().cloned().unwrap_or_default();
         tracing::info!("sequence {}: {}: {because}", sequence.sequence_id, diagnosis.verdict.name());
         Last::Done { verdict: diagnosis.verdict.name(), because }

@@ -12,13 +12,15 @@ use std::collections::VecDeque;
 
 use gripsight_vehicle::VehicleParameters;
 
+use crate::extended::Named;
 use crate::governor::Governor;
 use crate::plan::Plan;
 use crate::profile::{Drivetrain, SpeedProfile};
 use crate::progress::Progress;
 use crate::pursuit::{Moment, Pursuit};
-use crate::state::{Asked, CarState, DriveCommand, predict};
+use crate::state::{Asked, CarState, DriveCommand, predict, wheels_rad};
 use crate::tires::{TireSet, Trust};
+use crate::trial::{Memory, Model, Trial, trial};
 use crate::{Actuator, DrivingError, Longitudinal, Place, Track};
 
 /// How boldly to drive.
@@ -55,6 +57,8 @@ impl Default for Settings {
 const PROMPT_S: f64 = 0.004;
 /// Longest delay that is made up for.
 const LATEST_S: f64 = 0.5;
+/// Time in which wheels that lag are brought where they are wanted.
+const LEAD_S: f64 = 0.06;
 /// Oldest state that is made up for: beyond, the clocks differ.
 const OLDEST_S: f64 = 0.2;
 /// Share of the most likely peak to explore up to, where it was not reached.
@@ -77,6 +81,8 @@ const LEAST_DRIVE: f64 = 0.5;
 const LEAST_BRAKE: f64 = 0.5;
 /// Most that the driver drives against a slide sideways: more upsets a car at its limit.
 const SLIDE_MPS2: f64 = 0.5;
+/// Time of the last lap, over that planned, that is remembered to try models on.
+const LAP_MARGIN: f64 = 1.1;
 /// Share of the half width from which the car slows down.
 const WIDE: f64 = 0.6;
 
@@ -96,7 +102,11 @@ pub struct Driver {
     turned: f64,
     /// Grip that the road gave where it was less than planned.
     caught: Option<f64>,
+    /// As identified.
     actuator: Actuator,
+    /// What a diagnosis names, as far as the last lap agreed.
+    named: Named,
+    memory: Memory,
     plan: Plan,
     governor: Governor,
     progress: Progress,
@@ -124,6 +134,8 @@ impl Driver {
         let progress = Progress::new(track.length_m(), plan.grip);
         Ok(Self {
             actuator: start.actuator,
+            named: Named::default(),
+            memory: Memory::default(),
             vehicle,
             drivetrain,
             track,
@@ -149,6 +161,10 @@ impl Driver {
     /// [`DrivingError::Tires`] for a set that cannot be driven on; the driver keeps what it has.
     pub fn take(&mut self, set: TireSet) -> Result<(), DrivingError> {
         set.check()?;
+        if set.trust != Trust::Provisional {
+            // It holds what was named of the grip of the set before.
+            self.named.grip = None;
+        }
         match set.trust {
             Trust::Provisional => self.prior = Some(set),
             Trust::Assumed => (self.start, self.known, self.turned) = (set, None, 0.0),
@@ -163,6 +179,38 @@ impl Driver {
         self.actuator = set.actuator;
         self.renew();
         Ok(())
+    }
+
+    /// Tries the effects that a diagnosis names on the last lap, beside the model in use, and drives with them from now on where they predict it better.
+    /// A name may be wrong. `None`: too little was driven, or a figure is none that a car can have.
+    pub fn take_named(&mut self, named: Named) -> Option<Trial> {
+        if !named.is_plausible() {
+            return None;
+        }
+        let set = self.base().tires;
+        let model = |named: Named| Model {
+            vehicle: &self.vehicle,
+            tires: &set,
+            named,
+            actuator: named.actuator(&self.actuator),
+        };
+        let trial = trial(&self.memory, &model(self.named), &model(named))?;
+        if trial.taken {
+            self.tell(named);
+        }
+        Some(trial)
+    }
+
+    /// The same without a trial: for who knows.
+    pub fn tell(&mut self, named: Named) {
+        self.named = named;
+        self.renew();
+    }
+
+    /// What is driven with of what was named.
+    #[must_use]
+    pub fn named(&self) -> &Named {
+        &self.named
     }
 
     /// What identification tells of motor, brakes and resistances: planned and driven with from now on. What it does not tell stays as it was told before,
@@ -238,6 +286,8 @@ impl Driver {
                 acceleration_mps2: -self.plan.limits.brake_mps2,
             };
         }
+        let measured = *state;
+        let state = &self.named.state(&measured);
         let place = self.track.place(state.x_m, state.y_m, self.place.map(|p| p.station_m));
         self.place = Some(place);
         // A clock that went back: what was asked then says nothing of what acts now.
@@ -255,9 +305,11 @@ impl Driver {
             }
         }
         self.watch(state);
-        let delay_s = self.actuator.delay_s.min(LATEST_S);
-        let (car, then) = if age_s + delay_s > PROMPT_S {
-            let car = predict(state, (age_s, delay_s), &self.asked, &self.vehicle, &self.plan.tires);
+        let Actuator { delay_s, lag_s, .. } = self.late();
+        let lead_s = lag_s.min(LEAD_S);
+        let (car, then) = if age_s + delay_s + lead_s > PROMPT_S {
+            let car =
+                predict(state, (age_s, delay_s, lag_s), lead_s, &self.asked, &self.vehicle, &self.plan.tires);
             (car, self.track.place(car.x_m, car.y_m, Some(place.station_m)))
         } else {
             (*state, place)
@@ -273,7 +325,15 @@ impl Driver {
             assumed: self.is_assumed(),
         };
         let most = self.vehicle.max_steering_rad;
-        let angle_rad = self.settings.pursuit.steering_rad(&moment, &mut self.trim_rad).clamp(-most, most);
+        let wanted_rad = self.settings.pursuit.steering_rad(&moment, &mut self.trim_rad).clamp(-most, most);
+        let angle_rad = if lag_s > PROMPT_S {
+            // Wheels that lag are asked for more, so that they are there in time.
+            let reached = 1.0 - (-lead_s / lag_s).exp();
+            let wheels = wheels_rad(&self.asked, from_s + delay_s, delay_s, lag_s).unwrap_or(wanted_rad);
+            (wheels + (wanted_rad - wheels) / reached).clamp(-most, most)
+        } else {
+            wanted_rad
+        };
         let (speed_mps, acceleration_mps2) = self.longitudinal(state, place, angle_rad);
         let told = &self.plan.limits.told;
         let asked = Asked {
@@ -286,12 +346,22 @@ impl Driver {
         while self.asked.front().is_some_and(|a| a.from_s < state.stamp_s - 2.0 * LATEST_S) {
             self.asked.pop_front();
         }
-        DriveCommand { steering_rad: self.actuated(angle_rad), speed_mps, acceleration_mps2 }
+        let steering_rad = self.actuated(angle_rad);
+        self.memory.push(measured, from_s, steering_rad, LAP_MARGIN * self.plan.profile.lap_time_s());
+        DriveCommand { steering_rad, speed_mps, acceleration_mps2 }
+    }
+
+    /// The actuator, no later than is made up for.
+    fn late(&self) -> Actuator {
+        let actuator = self.named.actuator(&self.actuator);
+        let delay_s = actuator.delay_s.min(LATEST_S);
+        Actuator { delay_s, lag_s: actuator.lag_s.min(LATEST_S - delay_s), ..actuator }
     }
 
     fn actuated(&self, angle_rad: f64) -> f64 {
         let most = self.vehicle.max_steering_rad;
-        ((angle_rad - self.actuator.offset_rad) / self.actuator.gain).clamp(-most, most)
+        let actuator = self.named.actuator(&self.actuator);
+        ((angle_rad - actuator.offset_rad) / actuator.gain).clamp(-most, most)
     }
 
     /// Speed aimed at, and the acceleration towards it.
@@ -325,9 +395,10 @@ impl Driver {
     }
 
     fn watch(&mut self, state: &CarState) {
-        let then_s = state.stamp_s - self.actuator.delay_s;
-        let acting = self.asked.iter().rev().find(|a| a.from_s <= then_s + 1e-9);
-        let Some(acting) = acting.map(|a| a.angle_rad) else { return };
+        let Actuator { delay_s, lag_s, .. } = self.late();
+        let seen = self.asked.front().is_some_and(|a| a.from_s <= state.stamp_s - delay_s + 1e-9);
+        let acting = wheels_rad(&self.asked, state.stamp_s, delay_s, lag_s).filter(|_| seen);
+        let Some(acting) = acting else { return };
         if state.v_x_mps < 1.0 {
             self.governor.reset();
             return;
@@ -360,15 +431,18 @@ impl Driver {
     fn allowed(&self) -> f64 {
         let Settings { share, step, prior_step, beyond, .. } = self.settings;
         let base = self.known.as_ref().unwrap_or(&self.start);
-        let shown = base.grip();
+        let named = TireSet { tires: self.named.tires(&base.tires), ..*base };
+        let shown = named.grip();
         let careful = (ASSURED * self.turned).max(CAREFUL * share * shown).min(share * shown);
         let driven = self.driven.max(if base.trust == Trust::Assumed { careful } else { share * shown });
         let driven = driven.max(self.turned.min(share * self.start.grip()));
-        let likely = base.likely_peak.unwrap_or(f64::INFINITY);
+        let over = self.named.grip.map_or(1.0, |[front, rear]| front.min(rear));
+        let likely_peak = base.likely_peak.map(|peak| over * peak);
+        let likely = likely_peak.unwrap_or(f64::INFINITY);
         let bold = (step * driven).min(beyond * shown);
         let alone = match base.trust {
             Trust::Assumed => careful.max(self.driven).min(share * shown),
-            Trust::Accepted => bold.min(share * base.likely_peak.unwrap_or(shown)).max(share * shown),
+            Trust::Accepted => bold.min(share * likely_peak.unwrap_or(shown)).max(share * shown),
             Trust::AcceptedWithin => bold.min(LIKELY * likely).max(share * shown),
             Trust::Provisional => share * shown,
         };
@@ -384,9 +458,13 @@ impl Driver {
         self.caught.map_or(grip, |caught| grip.min(caught))
     }
 
+    /// The set that steering rests on.
+    fn base(&self) -> &TireSet {
+        self.known.as_ref().or(self.prior.as_ref()).unwrap_or(&self.start)
+    }
+
     fn renew(&mut self) {
-        let base = self.known.as_ref().or(self.prior.as_ref()).unwrap_or(&self.start);
-        let tires = base.tires;
+        let tires = self.named.tires(&self.base().tires);
         self.plan = Plan::new(&self.vehicle, &self.drivetrain, &self.track, &tires, self.allowed());
         self.progress.planned(self.plan.grip);
         self.governor.reset();

@@ -5,6 +5,7 @@
 
 mod driver;
 mod error;
+mod extended;
 mod governor;
 mod longitudinal;
 mod plan;
@@ -15,12 +16,15 @@ mod spline;
 mod state;
 mod tires;
 mod track;
+mod trial;
 
 pub use driver::{Driver, Settings};
 pub use error::DrivingError;
+pub use extended::Named;
 pub use longitudinal::{Longitudinal, ReachedAt};
 pub use profile::{Drivetrain, Limits, SpeedProfile};
 pub use pursuit::{Moment, Pursuit};
 pub use state::{CarState, DriveCommand};
 pub use tires::{Actuator, SteeringTable, TireSet, Trust};
 pub use track::{Place, Track, TrackPoint};
+pub use trial::Trial;

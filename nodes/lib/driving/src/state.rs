@@ -56,19 +56,39 @@ pub(crate) struct Asked {
     pub(crate) acceleration_mps2: f64,
 }
 
-/// The car `age_s + delay_s` later, by the single-track model with the commands that are still on their way: each acts `delay_s` after it was asked.
+/// Step of the wheels and of the prediction.
+const STEP_S: f64 = 0.01;
+/// Time constants of a lag after which it is over.
+const SETTLED: f64 = 4.0;
+
+/// The wheels' angle at a time: each angle acts `delay_s` after it was asked for, and the wheels follow it with a lag. `None`: nothing was asked for.
+pub(crate) fn wheels_rad(asked: &VecDeque<Asked>, time_s: f64, delay_s: f64, lag_s: f64) -> Option<f64> {
+    let at = |then_s: f64| {
+        let acting = asked.iter().rev().find(|a| a.from_s <= then_s - delay_s + 1e-9);
+        acting.or_else(|| asked.front()).map(|a| a.angle_rad)
+    };
+    let steps = (SETTLED * lag_s / STEP_S).ceil();
+    let follows = 1.0 - (-STEP_S / lag_s.max(1e-9)).exp();
+    let mut wheels = at(time_s - steps * STEP_S)?;
+    for step in (0..steps as usize).rev() {
+        wheels += follows * (at(time_s - step as f64 * STEP_S)? - wheels);
+    }
+    Some(wheels)
+}
+
+/// The car `age_s + delay_s + lead_s` later, by the single-track model with the commands that are still on their way.
 pub(crate) fn predict(
     now: &CarState,
-    (age_s, delay_s): (f64, f64),
+    (age_s, delay_s, lag_s): (f64, f64, f64),
+    lead_s: f64,
     asked: &VecDeque<Asked>,
     vehicle: &VehicleParameters,
     tires: &PacejkaParameters,
 ) -> CarState {
-    const STEP_S: f64 = 0.01;
     const SUBSTEP_S: f64 = 0.002;
     let car = SingleTrack::new(vehicle, tires);
     let mut at = *now;
-    let ahead_s = age_s + delay_s;
+    let ahead_s = age_s + delay_s + lead_s;
     let steps = (ahead_s / STEP_S).ceil();
     let dt_s = ahead_s / steps.max(1.0);
     for _ in 0..steps as usize {
@@ -76,7 +96,8 @@ pub(crate) fn predict(
         let then_s = at.stamp_s - delay_s;
         let acting = asked.iter().rev().find(|a| a.from_s <= then_s + 1e-9);
         let acting = acting.or_else(|| asked.front());
-        let (angle_rad, a_x) = acting.map_or((0.0, 0.0), |a| (a.angle_rad, a.acceleration_mps2));
+        let a_x = acting.map_or(0.0, |a| a.acceleration_mps2);
+        let angle_rad = wheels_rad(asked, at.stamp_s, delay_s, lag_s).unwrap_or(0.0);
         let input = Input { v_x_mps: at.v_x_mps, steering_rad: angle_rad };
         let from = State { v_y_mps: at.v_y_mps, yaw_rate_radps: at.yaw_rate_radps };
         let to = car.step(from, &input, &input, dt_s, SUBSTEP_S);

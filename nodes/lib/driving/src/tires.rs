@@ -42,8 +42,10 @@ pub enum Trust {
 /// From the steering asked to the command: `command(t) = (angle(t + delay) - offset)/gain`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Actuator {
-    /// From the command to the road wheels, lag included.
+    /// From the command to the road wheels; with the lag, where nobody tells them apart.
     pub delay_s: f64,
+    /// Time constant of what follows.
+    pub lag_s: f64,
     /// Road-wheel angle over command.
     pub gain: f64,
     /// Road-wheel angle at command zero.
@@ -52,7 +54,7 @@ pub struct Actuator {
 
 impl Default for Actuator {
     fn default() -> Self {
-        Self { delay_s: 0.0, gain: 1.0, offset_rad: 0.0 }
+        Self { delay_s: 0.0, lag_s: 0.0, gain: 1.0, offset_rad: 0.0 }
     }
 }
 
@@ -114,7 +116,7 @@ impl TireSet {
     pub fn check(&self) -> Result<(), DrivingError> {
         let grip = self.grip();
         let stiff = [self.tires.front, self.tires.rear].map(|t| t.normalized_stiffness());
-        let Actuator { delay_s, gain, offset_rad } = self.actuator;
+        let Actuator { delay_s, gain, offset_rad, .. } = self.actuator;
         if !(self.tires.is_finite() && grip > 0.01 && stiff.iter().all(|&k| k > 0.1)) {
             return Err(DrivingError::Tires(format!("grip {grip}, stiffness over load {stiff:?} 1/rad")));
         }

@@ -150,6 +150,7 @@ fn take(driver: &mut Driver, outcome: &Outcome, tires: &PacejkaParameters, trust
             delay_s: signals.steering_delay_s.max(0.0),
             gain: signals.steering_gain,
             offset_rad: signals.steering_offset_rad,
+            ..Actuator::default()
         },
     };
     if let Err(error) = driver.take(set)

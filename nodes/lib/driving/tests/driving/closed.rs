@@ -1,7 +1,8 @@
 //! The driver on a single-track car: what it does with sets, warnings, delays and less grip than planned.
 
 use gripsight_driving::{
-    Actuator, CarState, DriveCommand, Driver, Drivetrain, Longitudinal, Settings, TireSet, Track, Trust,
+    Actuator, CarState, DriveCommand, Driver, Drivetrain, Longitudinal, Named, Settings, TireSet, Track,
+    Trust,
 };
 use gripsight_vehicle::{Input, MagicFormula, PacejkaParameters, SingleTrack, State, VehicleParameters};
 
@@ -46,7 +47,16 @@ fn driver(start: TireSet) -> Driver {
 
 /// Drives `duration_s` on tires of a grip, the steering late by `delay_s`; the largest distance to the line after 3 s.
 fn drive(driver: &mut Driver, grip: impl Fn(f64) -> f64, delay_s: f64, duration_s: f64) -> f64 {
+    drive_with(driver, grip, &Named { steering_delay_s: Some(delay_s), ..Named::default() }, duration_s)
+}
+
+/// The same on a car with some effects.
+fn drive_with(driver: &mut Driver, grip: impl Fn(f64) -> f64, effects: &Named, duration_s: f64) -> f64 {
     const DT_S: f64 = 0.01;
+    let delay_s = effects.steering_delay_s.unwrap_or(0.0);
+    let follows = 1.0 - (-DT_S / effects.steering_lag_s.unwrap_or(0.0).max(1e-9)).exp();
+    let arm_m = effects.v_y_lever_arm_m.unwrap_or(0.0);
+    let mut wheels_rad = 0.0;
     let vehicle = rear_driven();
     let at = driver.track().at(0.0);
     let mut car = CarState {
@@ -62,8 +72,10 @@ fn drive(driver: &mut Driver, grip: impl Fn(f64) -> f64, delay_s: f64, duration_
     let mut commands = vec![DriveCommand::default(); late];
     let mut worst_m = 0.0_f64;
     for step in 0..(duration_s / DT_S) as usize {
-        commands.push(driver.command(&car, car.stamp_s));
-        let (steering, a_x) = (commands[step].steering_rad, commands[step + late].acceleration_mps2);
+        let measured = CarState { v_y_mps: car.v_y_mps + arm_m * car.yaw_rate_radps, ..car };
+        commands.push(driver.command(&measured, car.stamp_s));
+        wheels_rad += follows * (commands[step].steering_rad - wheels_rad);
+        let (steering, a_x) = (wheels_rad, commands[step + late].acceleration_mps2);
         let model = SingleTrack::new(&vehicle, &tires(grip(car.stamp_s)));
         let input = Input { v_x_mps: car.v_x_mps, steering_rad: steering };
         let from = State { v_y_mps: car.v_y_mps, yaw_rate_radps: car.yaw_rate_radps };
@@ -107,6 +119,45 @@ fn a_known_delay_is_made_up_for() {
     let with = drive(&mut driver(told(DELAY_S)), |_| 0.8, DELAY_S, 25.0);
     let without = drive(&mut driver(told(0.0)), |_| 0.8, DELAY_S, 25.0);
     assert!(with < 0.25 && with < 0.6 * without, "{with} m with the delay known, {without} m without");
+}
+
+#[test]
+fn the_effect_that_is_there_is_taken_and_makes_the_car_keep_its_line() {
+    let delay = Named { steering_delay_s: Some(0.15), ..Named::default() };
+    let lag = Named { steering_lag_s: Some(0.2), ..Named::default() };
+    let arm = Named { v_y_lever_arm_m: Some(0.3), ..Named::default() };
+    for effect in [delay, lag, arm] {
+        let mut driver = driver(set(0.7, Trust::Accepted));
+        assert_eq!(driver.take_named(effect), None, "nothing was driven yet");
+        let before_m = drive_with(&mut driver, |_| 0.8, &effect, 25.0);
+        let trial = driver.take_named(effect).unwrap();
+        assert!(trial.taken && trial.ratio < 0.7, "{trial:?}");
+        assert_eq!(*driver.named(), effect);
+        let after_m = drive_with(&mut driver, |_| 0.8, &effect, 25.0);
+        assert!(after_m < 0.8 * before_m, "{effect:?}: {after_m} m after {before_m} m");
+    }
+}
+
+#[test]
+fn an_effect_that_is_not_there_is_refused_with_its_figures() {
+    let mut driver = driver(set(0.8, Trust::Accepted));
+    drive(&mut driver, |_| 0.8, 0.0, 25.0);
+    let none = Named::default();
+    for wrong in [
+        Named { steering_delay_s: Some(0.05), ..none },
+        Named { steering_lag_s: Some(0.05), ..none },
+        Named { steering_gain: Some(1.1), ..none },
+        Named { v_y_lever_arm_m: Some(-0.1), ..none },
+        Named { v_y_bias_mps: Some(0.1), ..none },
+        Named { yaw_rate_scale: Some(0.95), ..none },
+        Named { grip: Some([1.0, 0.85]), ..none },
+    ] {
+        let trial = driver.take_named(wrong).unwrap();
+        assert!(!trial.taken && trial.ratio > 1.0 && trial.driven_s > 5.0, "{wrong:?}: {trial:?}");
+        assert_eq!(*driver.named(), none);
+    }
+    let nonsense = Named { steering_delay_s: Some(f64::NAN), ..none };
+    assert_eq!(driver.take_named(nonsense), None);
 }
 
 #[test]
