@@ -21,6 +21,8 @@ pub(crate) struct Facts {
     /// The last extended model taken, and why the last one was not.
     pub(crate) model: String,
     pub(crate) model_refused: Option<String>,
+    /// A model was given back.
+    pub(crate) given_back: bool,
     /// Sets taken, and what the one in use rests on.
     pub(crate) sets: u32,
     pub(crate) rests_on: &'static str,

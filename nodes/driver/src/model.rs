@@ -37,7 +37,9 @@ pub(crate) fn take(driver: &mut Driver, message: &ExtendedModel, vehicle_hash: &
     }
     let names = if used.is_empty() { "no effect".to_owned() } else { used.join(", ") };
     match driver.take_named(named) {
-        None => Tried::Refused(format!("{names}: less than a lap to try it on, or figures that no car has")),
+        None => Tried::Refused(format!(
+            "{names}: less than a lap to try it on, figures that no car has, or given back before"
+        )),
         Some(trial) if trial.taken => Tried::Taken(said(&names, &trial)),
         Some(trial) => Tried::Refused(said(&names, &trial)),
     }

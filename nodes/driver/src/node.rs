@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use gripsight_bag::decode;
-use gripsight_driving::{DriveCommand, Driver, Trust};
+use gripsight_driving::{DriveCommand, Driven, Driver, Trust};
 use gripsight_identification::vehicle_hash;
 use gripsight_msgs::standard::ackermann_msgs::{AckermannDrive, AckermannDriveStamped};
 use gripsight_msgs::standard::nav_msgs::Odometry;
@@ -156,6 +156,16 @@ impl Wheel {
             // The steering stays: turning the wheels blindly upsets a car more than it helps.
             let acceleration_mps2 = -self.driver.brake_mps2();
             self.publish(DriveCommand { speed_mps: 0.0, acceleration_mps2, ..self.last }).await;
+        }
+        if let Some(back) = self.driver.given_back().filter(|_| !self.facts.given_back) {
+            let lap = |lap: &Driven| {
+                format!("a lap of {:.2} s, {:.3} m from the line in the mean", lap.time_s, lap.mean_m)
+            };
+            let with = back.with.as_ref().map_or("a slide".to_owned(), lap);
+            let without = back.without.as_ref().map_or("no lap".to_owned(), lap);
+            let why = format!("given back after {with}; without it {without}");
+            tracing::warn!("the extended model is {why}");
+            (self.facts.model_refused, self.facts.given_back) = (Some(why), true);
         }
         self.facts.grip = self.driver.grip();
         self.facts.held_back = self.driver.held_back();

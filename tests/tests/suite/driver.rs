@@ -42,6 +42,20 @@ fn warn(domain: &Domain, python: &Path, hash: &str, sequence: u64) {
     assert!(peer.wait(PATIENCE).success());
 }
 
+/// Names a delay that the car does not have, as a diagnosis would that is wrong.
+fn name_a_delay(domain: &Domain, python: &Path, hash: &str) {
+    let delay =
+        json!({"name": "delay_s", "estimate": {"value": 0.2, "low": 0.19, "high": 0.21}, "unit": "s"});
+    let effect =
+        json!({"name": "steering_delay", "accepted": true, "parameters": [delay], "confidence": 0.99});
+    let model = json!({"handshake": {"vehicle_hash": hash}, "verdict": "effects", "effects": [effect]});
+    let kind = "gripsight_msgs/msg/ExtendedModel";
+    let arguments = ["publish", "/gap_diagnosis/extended_model", kind, "--qos", "latched"];
+    let mut peer = start_cyclone(domain, python, &arguments);
+    peer.feed(&model.to_string());
+    assert!(peer.wait(PATIENCE).success());
+}
+
 #[test]
 fn the_driver_laps_the_live_car_takes_a_set_and_slows_when_it_is_withdrawn() {
     let cyclone = cyclone();
@@ -68,6 +82,8 @@ fn the_driver_laps_the_live_car_takes_a_set_and_slows_when_it_is_withdrawn() {
             "pacejka:=identifier/pacejka",
             "-r",
             "grip:=identifier/grip",
+            "-r",
+            "extended_model:=gap_diagnosis/extended_model",
         ],
     );
     // The car stands until the first command reaches it: that lap shows nothing.
@@ -85,6 +101,9 @@ fn the_driver_laps_the_live_car_takes_a_set_and_slows_when_it_is_withdrawn() {
     let fast = lap(&driver);
     assert!(fast.time_s < 0.9 * slow.time_s, "{} s after {} s", fast.time_s, slow.time_s);
     assert_eq!(fast.exits, 0, "off the track on its own tires");
+
+    name_a_delay(&domain, &python, &hash);
+    driver.wait_for_log("the extended model is not taken: steering_delay: over", PATIENCE);
 
     let told = Instant::now();
     warn(&domain, &python, &hash, 6);

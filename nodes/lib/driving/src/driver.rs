@@ -15,6 +15,7 @@ use gripsight_vehicle::VehicleParameters;
 use crate::extended::Named;
 use crate::governor::Governor;
 use crate::plan::Plan;
+use crate::probation::{GivenBack, Probation};
 use crate::profile::{Drivetrain, SpeedProfile};
 use crate::progress::Progress;
 use crate::pursuit::{Moment, Pursuit};
@@ -81,6 +82,8 @@ const LEAST_DRIVE: f64 = 0.5;
 const LEAST_BRAKE: f64 = 0.5;
 /// Most that the driver drives against a slide sideways: more upsets a car at its limit.
 const SLIDE_MPS2: f64 = 0.5;
+/// Time in which a car settles after a model was given back.
+const SETTLES_S: f64 = 2.0;
 /// Time of the last lap, over that planned, that is remembered to try models on.
 const LAP_MARGIN: f64 = 1.1;
 /// Share of the half width from which the car slows down.
@@ -102,11 +105,16 @@ pub struct Driver {
     turned: f64,
     /// Grip that the road gave where it was less than planned.
     caught: Option<f64>,
+    /// The same before the last model was taken.
+    caught_before: Option<f64>,
+    /// Until when a slide is no news: a model was given back.
+    trusted_until_s: f64,
     /// As identified.
     actuator: Actuator,
     /// What a diagnosis names, as far as the last lap agreed.
     named: Named,
     memory: Memory,
+    probation: Probation,
     plan: Plan,
     governor: Governor,
     progress: Progress,
@@ -136,6 +144,7 @@ impl Driver {
             actuator: start.actuator,
             named: Named::default(),
             memory: Memory::default(),
+            probation: Probation::default(),
             vehicle,
             drivetrain,
             track,
@@ -146,6 +155,8 @@ impl Driver {
             driven: 0.0,
             turned: 0.0,
             caught: None,
+            caught_before: None,
+            trusted_until_s: f64::NEG_INFINITY,
             plan,
             governor: Governor::default(),
             progress,
@@ -182,9 +193,10 @@ impl Driver {
     }
 
     /// Tries the effects that a diagnosis names on the last lap, beside the model in use, and drives with them from now on where they predict it better.
-    /// A name may be wrong. `None`: too little was driven, or a figure is none that a car can have.
+    /// A name may be wrong: after a lap that is worse than the one before it is given back ([`Self::given_back`]). `None`: too little was driven, a
+    /// figure is none that a car can have, or effects of these kinds were given back before.
     pub fn take_named(&mut self, named: Named) -> Option<Trial> {
-        if !named.is_plausible() {
+        if !named.is_plausible() || self.probation.was_given_back(&named) {
             return None;
         }
         let set = self.base().tires;
@@ -196,6 +208,8 @@ impl Driver {
         };
         let trial = trial(&self.memory, &model(self.named), &model(named))?;
         if trial.taken {
+            self.probation.begin(self.memory.last_s(), self.named);
+            self.caught_before = self.caught;
             self.tell(named);
         }
         Some(trial)
@@ -205,6 +219,12 @@ impl Driver {
     pub fn tell(&mut self, named: Named) {
         self.named = named;
         self.renew();
+    }
+
+    /// What was taken and given back after a lap.
+    #[must_use]
+    pub fn given_back(&self) -> Option<&GivenBack> {
+        self.probation.given_back.as_ref()
     }
 
     /// What is driven with of what was named.
@@ -297,7 +317,15 @@ impl Driver {
             self.asked.clear();
             self.governor.reset();
         }
-        if let Some(driven) = self.progress.pass(place, self.plan.grip) {
+        let halves = self.progress.halves();
+        let driven = self.progress.pass(place, self.plan.grip);
+        let ends = self.progress.halves() > halves && place.station_m < 0.25 * self.track.length_m();
+        if let Some(before) = self.probation.pass(state.stamp_s, place.offset_m, ends, &self.named) {
+            // What a wrong model took for a slide was none.
+            self.caught = self.caught_before;
+            self.tell(before);
+        }
+        if let Some(driven) = driven {
             self.driven = driven;
             self.caught = self.caught.map(|caught| caught * REGAINED);
             if self.caught.is_some() || self.is_assumed() {
@@ -407,7 +435,14 @@ impl Driver {
         let Some(look) = self.governor.look(state, acting, &self.vehicle, &self.plan.tires, assumed) else {
             return;
         };
-        if let Some(given) = look.given {
+        if look.given.is_some()
+            && let Some(before) = self.probation.slides(&self.named)
+        {
+            self.trusted_until_s = state.stamp_s + SETTLES_S;
+            self.tell(before);
+        } else if look.given.is_some() && state.stamp_s < self.trusted_until_s {
+            // The end of what the model brought about.
+        } else if let Some(given) = look.given {
             self.catch(CAUGHT * given);
         } else if assumed {
             self.turned = self.turned.max(look.turned);
@@ -431,7 +466,7 @@ impl Driver {
     fn allowed(&self) -> f64 {
         let Settings { share, step, prior_step, beyond, .. } = self.settings;
         let base = self.known.as_ref().unwrap_or(&self.start);
-        let named = TireSet { tires: self.named.tires(&base.tires), ..*base };
+        let named = TireSet { tires: self.named.planned(&base.tires), ..*base };
         let shown = named.grip();
         let careful = (ASSURED * self.turned).max(CAREFUL * share * shown).min(share * shown);
         let driven = self.driven.max(if base.trust == Trust::Assumed { careful } else { share * shown });
@@ -464,7 +499,7 @@ impl Driver {
     }
 
     fn renew(&mut self) {
-        let tires = self.named.tires(&self.base().tires);
+        let tires = self.named.planned(&self.base().tires);
         self.plan = Plan::new(&self.vehicle, &self.drivetrain, &self.track, &tires, self.allowed());
         self.progress.planned(self.plan.grip);
         self.governor.reset();

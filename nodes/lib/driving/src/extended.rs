@@ -58,6 +58,21 @@ impl Named {
         true
     }
 
+    /// Which figures are named.
+    pub(crate) fn kinds(&self) -> [bool; 9] {
+        [
+            self.steering_delay_s.is_some(),
+            self.steering_lag_s.is_some(),
+            self.steering_gain.is_some(),
+            self.steering_offset_rad.is_some(),
+            self.v_y_lever_arm_m.is_some(),
+            self.v_y_bias_mps.is_some(),
+            self.yaw_rate_bias_radps.is_some(),
+            self.yaw_rate_scale.is_some(),
+            self.grip.is_some(),
+        ]
+    }
+
     /// Whether every figure is one that a car can have.
     pub(crate) fn is_plausible(&self) -> bool {
         let within =
@@ -115,12 +130,21 @@ impl Named {
 
     /// The tires with the named grip: cornering stiffness and shape stay.
     pub(crate) fn tires(&self, set: &PacejkaParameters) -> PacejkaParameters {
-        let Some([front, rear]) = self.grip else { return *set };
-        let axle = |t: &MagicFormula, g: f64| {
-            MagicFormula::from_stiffness(t.normalized_stiffness(), t.c, t.d * g, t.e)
-        };
-        PacejkaParameters { front: axle(&set.front, front), rear: axle(&set.rear, rear) }
+        scaled(set, self.grip)
     }
+
+    /// The tires to plan and steer with: both axles with the grip of the one that lost more. A steering table of a car that oversteers asks for less
+    /// angle the more the car is to turn, and spins it.
+    pub(crate) fn planned(&self, set: &PacejkaParameters) -> PacejkaParameters {
+        scaled(set, self.grip.map(|[front, rear]| [front.min(rear); 2]))
+    }
+}
+
+fn scaled(set: &PacejkaParameters, grip: Option<[f64; 2]>) -> PacejkaParameters {
+    let Some([front, rear]) = grip else { return *set };
+    let axle =
+        |t: &MagicFormula, g: f64| MagicFormula::from_stiffness(t.normalized_stiffness(), t.c, t.d * g, t.e);
+    PacejkaParameters { front: axle(&set.front, front), rear: axle(&set.rear, rear) }
 }
 
 #[cfg(test)]

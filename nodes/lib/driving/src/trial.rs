@@ -19,7 +19,7 @@ const EVERY_S: f64 = 0.1;
 const AHEAD_S: [f64; 2] = [0.2, 0.4];
 /// Slowest that is predicted.
 const SLOW_MPS: f64 = 1.0;
-/// Mean squared error over that of the model in use from which a model is better, and from which a channel is worse.
+/// Squared error over that of the model in use from which a model is better, and from which a channel is worse.
 const BETTER: f64 = 0.95;
 const WORSE: f64 = 1.05;
 /// Integration step.
@@ -57,6 +57,10 @@ impl Memory {
         ends.map_or(0.0, |(first, last)| last.stamp_s - first.stamp_s)
     }
 
+    pub(crate) fn last_s(&self) -> f64 {
+        self.measured.back().map_or(0.0, |last| last.stamp_s)
+    }
+
     /// The wheels' angles when the states were measured.
     fn wheels_rad(&self, actuator: &Actuator) -> Vec<f64> {
         let (mut place, mut at, mut before_s) = (0, None, 0.0);
@@ -75,12 +79,13 @@ impl Memory {
         wheels
     }
 
-    /// Mean squared errors of v_y and yaw rate, as measured, on what is remembered.
+    /// Medians of the squared errors of v_y and yaw rate, as measured, on what is remembered. A car near its limit is predicted wildly now and then,
+    /// whatever the model: a mean would rest on these moments alone.
     fn errors(&self, model: &Model<'_>) -> [f64; 2] {
         let wheels = self.wheels_rad(&model.actuator);
         let tires = model.named.tires(model.tires);
         let car = SingleTrack::new(model.vehicle, &tires);
-        let (mut sums, mut count, mut next_s) = ([0.0; 2], 0.0, f64::NEG_INFINITY);
+        let (mut squares, mut next_s) = ([Vec::new(), Vec::new()], f64::NEG_INFINITY);
         for first in 0..self.measured.len() {
             let from_s = self.measured[first].stamp_s;
             if from_s < next_s {
@@ -104,12 +109,14 @@ impl Memory {
                 }
                 horizons.next();
                 let [v_y, yaw_rate] = model.named.measured([at.v_y_mps, at.yaw_rate_radps]);
-                sums[0] += (v_y - there.v_y_mps).powi(2);
-                sums[1] += (yaw_rate - there.yaw_rate_radps).powi(2);
-                count += 1.0;
+                squares[0].push((v_y - there.v_y_mps).powi(2));
+                squares[1].push((yaw_rate - there.yaw_rate_radps).powi(2));
             }
         }
-        sums.map(|sum| sum / f64::max(count, 1.0))
+        squares.map(|mut channel| {
+            channel.sort_by(f64::total_cmp);
+            channel.get(channel.len() / 2).copied().unwrap_or(f64::NAN)
+        })
     }
 }
 
@@ -123,7 +130,7 @@ pub(crate) struct Model<'a> {
     pub(crate) actuator: Actuator,
 }
 
-/// How a model did on the last lap, beside the one in use. Errors are root mean squares of predictions.
+/// How a model did on the last lap, beside the one in use. Errors are medians of predictions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trial {
     /// Driving that it was checked on.
@@ -132,7 +139,7 @@ pub struct Trial {
     pub v_y_mps: [f64; 2],
     /// Error of the yaw rate, likewise.
     pub yaw_rate_radps: [f64; 2],
-    /// Mean of both channels' squared errors over those of the model in use.
+    /// Squared errors over those of the model in use, mean of both channels.
     pub ratio: f64,
     /// Whether it is driven with from now on.
     pub taken: bool,

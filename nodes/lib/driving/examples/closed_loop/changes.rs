@@ -152,7 +152,7 @@ fn drive(plan: &Plan, verbose: bool) -> Result<Vec<Row>> {
         Knows::Prior => Variant::Prior.prior(mu, case.seed + 1000 * floor as u64),
         _ => None,
     };
-    let mut run = Loop::new(case, start, &[], verbose)?;
+    let mut run = Loop::new(case, start, verbose)?;
     if matches!(knows, Knows::Identified | Knows::Prior) {
         run.learner = Some(Learner::new(run.vehicle.clone(), prior(case.mu, 0)));
     }

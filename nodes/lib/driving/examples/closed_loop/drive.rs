@@ -5,6 +5,7 @@ use gripsight_driving::{CarState, Driver, Drivetrain, Limits, Settings, TireSet,
 use gripsight_reference_car::{Command, Course, EffectSetting, SensorSample, Simulation};
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 
+use crate::effects::Recent;
 use crate::learner::Learner;
 use crate::plant;
 use crate::referee::Referee;
@@ -19,6 +20,8 @@ pub(crate) struct Loop {
     pub(crate) driver: Driver,
     pub(crate) referee: Referee,
     pub(crate) learner: Option<Learner>,
+    /// Telemetry to diagnose from.
+    pub(crate) recent: Option<Recent>,
     pub(crate) vehicle: VehicleParameters,
     drivetrain: Drivetrain,
     steps: u64,
@@ -33,21 +36,48 @@ pub(crate) fn truth(tires: PacejkaParameters) -> TireSet {
 
 impl Loop {
     /// At the line, rolling at a speed that any of these roads allows.
-    pub(crate) fn new(case: &Case, start: TireSet, effects: &[EffectSetting], verbose: bool) -> Result<Self> {
+    pub(crate) fn new(case: &Case, start: TireSet, verbose: bool) -> Result<Self> {
+        Self::paced(case, start, &[], Settings::default().share, verbose)
+    }
+
+    /// The same on a car with effects, with a share of the grip.
+    pub(crate) fn paced(
+        case: &Case,
+        start: TireSet,
+        effects: &[EffectSetting],
+        share: f64,
+        verbose: bool,
+    ) -> Result<Self> {
         let reversed = case.seed % 2 == 1;
         let vehicle = plant::vehicle(&case.car)?;
         let drivetrain = plant::drivetrain(&case.car);
         let track = plant::track(&case.car, &case.track, reversed)?;
         let limits = Limits::new(&vehicle, truth(case.tires).grip(), &drivetrain);
-        let driver =
-            Driver::new(vehicle.clone(), drivetrain.clone(), track.clone(), start, Settings::default())?;
+        let driver = Driver::new(
+            vehicle.clone(),
+            drivetrain.clone(),
+            track.clone(),
+            start,
+            Settings { share, ..Settings::default() },
+        )?;
         let course = Course::Track { name: case.track.clone(), reversed };
         let mut scenario = plant::scenario(&case.car, course, case.mu, case.seed);
         scenario.driver.pace = (0.25 / case.mu).min(1.0);
         scenario.effects.extend(effects.iter().cloned());
         let sim = Simulation::new(scenario)?;
         let referee = Referee::new(track, &limits, sim.track().context("no track")?.half_width_m());
-        Ok(Self { sim, driver, referee, learner: None, vehicle, drivetrain, steps: 0, halves: 0, verbose })
+        Ok(Self {
+            sim,
+            driver,
+            referee,
+            learner: None,
+            recent: None,
+            vehicle,
+            drivetrain,
+            steps: 0,
+            halves: 0,
+            verbose,
+        })
     }
 
     /// The road changes, everywhere and at once; `tires` are the plant's on it.
@@ -65,6 +95,9 @@ impl Loop {
             }
             self.steps += 1;
             for sample in self.sim.drain().0 {
+                if let Some(recent) = &mut self.recent {
+                    recent.push(&sample)?;
+                }
                 if let Some(learner) = &mut self.learner {
                     learner.push(&sample, &mut self.driver)?;
                 }

@@ -5,7 +5,9 @@
 
 mod changes;
 mod drive;
+mod effects;
 mod learner;
+mod picture;
 mod plant;
 mod referee;
 mod run;
@@ -27,6 +29,10 @@ enum Experiment {
     Laps,
     /// The floor changes in the middle of the run: changes.csv
     Changes,
+    /// The first case, drawn: laps.svg
+    Picture,
+    /// The car has an effect that the controller's model lacks, on the true tires of the car without it: effects.csv
+    Effects,
 }
 
 /// Drives the reference car from mu = 0.51 on roads that it does not know, with and without identification.
@@ -104,6 +110,11 @@ fn main() -> Result<()> {
     let summary = match arguments.experiment {
         Experiment::Laps => laps(&arguments)?,
         Experiment::Changes => changes::experiment(&arguments)?,
+        Experiment::Picture => {
+            print!("{}", picture::experiment(&arguments)?);
+            return Ok(());
+        }
+        Experiment::Effects => effects::experiment(&arguments)?,
     };
     std::fs::write(arguments.out.join("summary.md"), &summary)?;
     print!("{summary}");

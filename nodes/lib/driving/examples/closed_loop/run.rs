@@ -85,7 +85,7 @@ pub(crate) struct Run {
 /// Drives it.
 pub(crate) fn drive(case: &Case, variant: Variant, verbose: bool) -> Result<Run> {
     let start = if variant == Variant::True { truth(case.tires) } else { TireSet::start() };
-    let mut run = Loop::new(case, start, &[], verbose)?;
+    let mut run = Loop::new(case, start, verbose)?;
     if variant == Variant::True {
         run.driver.take_longitudinal(plant::told(&case.car, case.mu));
     }
