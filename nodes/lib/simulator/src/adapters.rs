@@ -18,17 +18,19 @@ pub enum Adapter {
     F1tenthGym,
     /// Autoware's simple planning simulator, by its published equations.
     AutowareSimplePlanning,
-    /// Open-Car-Dynamics, by the Python binding of the user's checkout.
+    /// Open-Car-Dynamics, by the C++ library in the user's checkout.
     OpenCarDynamics,
 }
 
-const FILES: [(&str, &str); 6] = [
+const FILES: [(&str, &str); 8] = [
     ("gripsight_simulator.py", include_str!("../adapters/gripsight_simulator.py")),
     ("slipx_adapter.py", include_str!("../adapters/slipx_adapter.py")),
     ("commonroad_adapter.py", include_str!("../adapters/commonroad_adapter.py")),
     ("f1tenth_gym_adapter.py", include_str!("../adapters/f1tenth_gym_adapter.py")),
     ("autoware_simple_planning_adapter.py", include_str!("../adapters/autoware_simple_planning_adapter.py")),
     ("open_car_dynamics_adapter.py", include_str!("../adapters/open_car_dynamics_adapter.py")),
+    ("open_car_dynamics.cpp", include_str!("../adapters/open_car_dynamics.cpp")),
+    ("gripsight_simulator.hpp", include_str!("../adapters/gripsight_simulator.hpp")),
 ];
 
 impl Adapter {

@@ -54,7 +54,9 @@ fn started(text: &str) -> Option<Simulator> {
     match Simulator::start(&file) {
         Ok(simulator) => Some(simulator),
         Err(SimulatorError::Died { last_words, .. })
-            if ["No module named", "no dynamic_models.py"].iter().any(|w| last_words.contains(w)) =>
+            if ["No module named", "no dynamic_models.py", "no Open-Car-Dynamics in"]
+                .iter()
+                .any(|w| last_words.contains(w)) =>
         {
             eprintln!("skipped: {}", last_words.lines().last().unwrap_or_default());
             None
@@ -66,6 +68,13 @@ fn started(text: &str) -> Option<Simulator> {
 #[test]
 fn adapters_turn_left_when_told_to() {
     let checkout = std::env::var("GRIPSIGHT_F1TENTH_GYM").unwrap_or_else(|_| "no_checkout".to_owned());
+    // A clone with its submodules, and the folder that holds eigen3/Eigen.
+    let of = |name: &str, other: &str| std::env::var(name).unwrap_or_else(|_| other.to_owned());
+    let open_car = format!(
+        "adapter: open_car_dynamics\ntime_limit_s: 1200\noptions: {{checkout: '{}', eigen: '{}'}}",
+        of("GRIPSIGHT_OPEN_CAR_DYNAMICS", "no_checkout"),
+        of("GRIPSIGHT_EIGEN", "/usr/include")
+    );
     let gym = format!("adapter: f1tenth_gym\noptions: {{checkout: '{checkout}'}}");
     for text in [
         "adapter: slipx",
@@ -74,7 +83,7 @@ fn adapters_turn_left_when_told_to() {
         "adapter: commonroad\noptions: {model: mb}",
         "adapter: autoware_simple_planning",
         "adapter: autoware_simple_planning\noptions: {model: ideal_steer_acc}",
-        "adapter: open_car_dynamics",
+        &open_car,
         &gym,
     ] {
         if let Some(simulator) = started(text) {
