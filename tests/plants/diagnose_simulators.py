@@ -85,6 +85,7 @@ def run(gripsight, folder, kind, changes, seed, arguments):
         print(said.stderr, file=sys.stderr)
         return dict(simulator=kind, truth="; ".join(changes), seed=seed, verdict="error")
     gap = json.loads((folder / "result/gap.json").read_text())
+    timing = json.loads((folder / "result/timing.json").read_text())
     named = [e for e in gap["effects"] if e["accepted"]]
     right, inside, errors = [], [], []
     for name, value in changes.items():
@@ -104,7 +105,8 @@ def run(gripsight, folder, kind, changes, seed, arguments):
         not_told_from="; ".join(n for e in named for n in e["confused_with"]),
         all_right=all(right) if changes else not named, extra=max(0, len(named) - len(changes)), inside=f"{sum(inside)}/{len(inside)}",
         size_error=max((abs(e) for e in errors), default=math.nan), nominal=gap["gap"]["nominal"]["value"], after=gap["gap"]["after"]["value"],
-        patched=gap["patch"]["verified"], rollouts=gap["simulator"]["rollouts"], candidates=gap["simulator"]["candidates"], wall_s=wall_s)
+        patched=gap["patch"]["verified"], rollouts=gap["simulator"]["rollouts"], candidates=gap["simulator"]["candidates"], wall_s=wall_s,
+        diagnosing_s=timing["diagnosing_s"], simulator_s=timing["simulator_s"])
     row.write_text(json.dumps(out))
     return out
 
@@ -141,6 +143,11 @@ def main():
     print("all changes right:", wilson(sum(r["all_right"] for r in changed), len(changed)))
     print("false alarms:", wilson(sum(not r["all_right"] for r in of("unchanged")), len(of("unchanged"))))
     print("90 % intervals hold:", wilson(sum(a for a, _ in inside), sum(b for _, b in inside)))
+    for kind in dict.fromkeys(r["simulator"] for r in done):
+        of_it = [r for r in done if r["simulator"] == kind]
+        rollouts, whole_s, simulator_s = (sum(r[k] for r in of_it) for k in ("rollouts", "diagnosing_s", "simulator_s"))
+        print(f"{kind}: {max(r['rollouts'] for r in of_it):.0f} rollouts at most, {rollouts / simulator_s:.2f} of {arguments.duration:g} s a second; "
+              f"{100 * simulator_s / whole_s:.0f} % of the time is the simulator's")
     print("patched, times the noise:", f"median {np.median(patched):.3g}, most {patched[-1]:.3g}, of {len(patched)}" if patched else "none")
 
 
