@@ -209,7 +209,8 @@ impl Driver {
         let trial = trial(&self.memory, &model(self.named), &model(named))?;
         if trial.taken {
             self.probation.begin(self.memory.last_s(), self.named);
-            self.caught_before = self.caught;
+            // What the model before took for a slide may have been none.
+            self.caught_before = self.caught.take();
             self.tell(named);
         }
         Some(trial)
@@ -439,6 +440,7 @@ impl Driver {
             && let Some(before) = self.probation.slides(&self.named)
         {
             self.trusted_until_s = state.stamp_s + SETTLES_S;
+            self.caught = self.caught_before;
             self.tell(before);
         } else if look.given.is_some() && state.stamp_s < self.trusted_until_s {
             // The end of what the model brought about.

@@ -67,7 +67,9 @@ impl Probation {
         }
         self.taken = None;
         let without = without?;
-        if lap.mean_m < FARTHER * without.mean_m && lap.time_s < SLOWER * without.time_s {
+        // A car that goes faster may be farther from the line.
+        let faster = SLOWER * lap.time_s < without.time_s;
+        if faster || lap.mean_m < FARTHER * without.mean_m && lap.time_s < SLOWER * without.time_s {
             return None;
         }
         self.given_back = Some(GivenBack { named: *used, without: Some(without), with: Some(lap) });
@@ -109,6 +111,7 @@ mod tests {
         assert!(probation.was_given_back(&Named { v_y_lever_arm_m: Some(0.2), ..Named::default() }));
         assert!(!probation.was_given_back(&Named { steering_delay_s: Some(0.1), ..named }));
         assert_eq!(back(0.02, 10.5).0, Some(Named::default()));
+        assert_eq!(back(0.05, 5.0).0, None);
         // A slide ends it at once, and only while it has yet to prove itself.
         let mut proven = back(0.02, 10.0).1;
         assert_eq!(proven.slides(&named), None);
