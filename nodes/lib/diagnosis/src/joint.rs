@@ -23,6 +23,8 @@ struct Part {
     start: DMatrix<f64>,
     /// Which channel each row belongs to.
     channel: Vec<usize>,
+    /// Place of each row in the layout of the model: what is not measured has none.
+    kept: Vec<usize>,
 }
 
 /// The joint problem around a model.
@@ -91,6 +93,7 @@ impl Joint {
                     jacobian: DMatrix::zeros(n, columns.len()),
                     start: DMatrix::zeros(n, 2),
                     channel: kept.iter().map(|i| i % channels).collect(),
+                    kept: Vec::new(),
                 };
                 let mut predicted = Vec::new();
                 for (number, (seeds, (model, own, map))) in seeds.iter().zip(&models).enumerate() {
@@ -109,6 +112,7 @@ impl Joint {
                         }
                     }
                 }
+                part.kept = kept;
                 part
             })
             .collect();
@@ -122,8 +126,8 @@ impl Joint {
     /// predictions with the effect less those without, over its value, window after window in the layout of the model.
     pub(crate) fn with_column(&mut self, engine: &Engine<'_>, column: usize, slopes: &[Vec<f64>]) {
         for (part, slope) in self.parts.iter_mut().zip(slopes) {
-            for (row, (s, &channel)) in slope.iter().zip(&part.channel).enumerate() {
-                part.jacobian[(row, column)] = s / engine.sigma[channel];
+            for (row, (&place, &channel)) in part.kept.iter().zip(&part.channel).enumerate() {
+                part.jacobian[(row, column)] = slope[place] / engine.sigma[channel];
             }
         }
     }
@@ -133,8 +137,9 @@ impl Joint {
         let one = vec![1.0; self.channels];
         let (mut product, mut square) = (0.0, 0.0);
         for (part, slope) in self.parts.iter().zip(slopes) {
-            let column =
-                DMatrix::from_fn(part.channel.len(), 1, |r, _| slope[r] / engine.sigma[part.channel[r]]);
+            let column = DMatrix::from_fn(part.kept.len(), 1, |r, _| {
+                slope[part.kept[r]] / engine.sigma[part.channel[r]]
+            });
             let alone = Part { jacobian: column, ..part.without_columns() };
             let (residual, jacobian, _) = alone.projected(&one);
             product += jacobian.column(0).dot(&residual);
@@ -304,6 +309,7 @@ impl Part {
             jacobian: DMatrix::zeros(0, 0),
             start: self.start.clone(),
             channel: self.channel.clone(),
+            kept: self.kept.clone(),
         }
     }
 

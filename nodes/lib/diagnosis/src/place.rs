@@ -134,7 +134,12 @@ fn samples(
                     run.lap_share[at] * recording.laps.lap_m,
                     run.time_s(at),
                 ],
-                squares: scored.iter().map(|&c| (error(c) / recording.sigma[c]).powi(2)).collect(),
+                // What is not asked counts as met.
+                squares: scored
+                    .iter()
+                    .map(|&c| (error(c) / recording.sigma[c]).powi(2))
+                    .map(|square| if square.is_nan() { 0.0 } else { square })
+                    .collect(),
                 axles: [axle(l_f), axle(-l_r)],
             });
         }

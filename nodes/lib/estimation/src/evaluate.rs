@@ -1,6 +1,6 @@
 //! Errors of open-loop rollouts in units of the noise, with intervals by block bootstrap.
 
-use gripsight_model::Recording;
+use gripsight_model::{Channel, Recording, Window};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -36,10 +36,13 @@ pub struct Score {
 const RESAMPLES: usize = 400;
 
 /// Residuals of a window that are free after its start state and the means taken off are counted.
-fn freedom(recording: &Recording, len: usize) -> f64 {
+fn freedom(recording: &Recording, window: &Window) -> f64 {
     let scored = || recording.channels.iter().filter(|c| c.scored());
     let means = scored().filter(|c| c.without_mean()).count();
-    ((len * scored().count()) as f64 - 2.0 - means as f64).max(1.0)
+    let jumps = &recording.runs[window.segment].jumps[window.from..window.from + window.len];
+    let unasked = scored().filter(|c| **c == Channel::LongitudinalAcceleration).count()
+        * jumps.iter().filter(|j| **j).count();
+    ((window.len * scored().count() - unasked) as f64 - 2.0 - means as f64).max(1.0)
 }
 
 /// Blocks that a bootstrap needs.
@@ -55,7 +58,7 @@ pub fn by_block(recording: &Recording, windows: &Windows, score: &Score) -> Vec<
     let few = numbers.len() < LEAST_BLOCKS;
     for (k, (window, &square)) in windows.windows.iter().zip(&score.squares).enumerate() {
         let block = if few { k } else { windows.block[k] };
-        let n = freedom(recording, window.len);
+        let n = freedom(recording, window);
         match blocks.last_mut().filter(|b| b.0 == block) {
             Some(last) => {
                 last.1 += square;

@@ -263,6 +263,7 @@ impl Drive {
         for (k, at) in [from, to].iter().enumerate() {
             run.v_x_mps[k] = at.v_x_mps;
             run.a_x_mps2[k] = at.a_x_mps2;
+            run.recorded_a_x_mps2[k] = at.a_x_mps2;
             run.force_x_mps2[k] = at.force_x_mps2;
             run.lap_share[k] = at.lap_share;
             run.place_rad[k] = if on_course { place(at.lap_share) } else { heading_rad };
@@ -289,7 +290,7 @@ impl Drive {
     }
 
     fn sense(&mut self, dt_s: f64) {
-        let Moving { x: [v_y_mps, yaw_rate_radps], speed_mps, heading_rad, rates } = self.moving;
+        let Moving { x: [v_y_mps, yaw_rate_radps], speed_mps, heading_rad, rates, .. } = self.moving;
         let most = (SENSED_S / dt_s).ceil().max(2.0) as usize;
         self.past.dt_s = dt_s;
         let newest = [
@@ -340,18 +341,21 @@ fn step_of(on_course: bool, has_command: bool, smooth: [f64; 2]) -> Recording {
             v_x_mps: two(),
             steering_rad: two(),
             a_x_mps2: two(),
+            recorded_a_x_mps2: two(),
             force_x_mps2: two(),
             lap_share: two(),
             heading_rad: two(),
             place_rad: two(),
             smooth: smooth.map(|v| vec![v; 2]),
             measured: Vec::new(),
+            jumps: Vec::new(),
         }],
         channels: Vec::new(),
         sigma: Vec::new(),
         weights: Vec::new(),
         laps: Laps::of_length(if on_course { 1.0 } else { 0.0 }),
         has_command,
+        force_ahead: 0.0,
         derived_a_y: false,
         recorded_s: 0.0,
         least_speed_mps: 0.0,
@@ -371,6 +375,7 @@ mod tests {
         let run = &mut recording.runs[0];
         // Nothing is known of what was before.
         run.steering_rad[1] = run.steering_rad[0];
+        run.recorded_a_x_mps2.clone_from(&run.a_x_mps2);
         let run = run.clone();
         let driven = DrivenCar {
             vehicle: VehicleParameters::f1tenth(),

@@ -226,8 +226,10 @@ impl Rollout for ExtendedModel<'_> {
                 if c.without_mean() { v[range.clone()].iter().sum::<f64>() / window.len as f64 } else { 0.0 }
             })
             .collect();
+        let asked = |c: &Channel, k: usize| *c != Channel::LongitudinalAcceleration || !run.jumps[k];
         for k in range {
-            out.extend(run.measured.iter().zip(&means).map(|(v, m)| v[k] - m));
+            let of = channels.iter().zip(&run.measured).zip(&means);
+            out.extend(of.map(|((c, v), m)| if asked(c, k) { v[k] - m } else { f64::NAN }));
         }
     }
 

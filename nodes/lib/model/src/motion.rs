@@ -9,12 +9,10 @@ use gripsight_vehicle::{PacejkaParameters, Real};
 use crate::effects::Lagging;
 use crate::flexible::Push;
 use crate::model::ExtendedModel;
-use crate::terms::{Axle, Axles, Car, Lag, Moment, Motion, Outputs};
+use crate::terms::{Axle, Axles, Car, Lag, Moment, Motion, Outputs, Sprung};
 
 /// Below this forward speed slip angles mean nothing; the model is evaluated as if at this speed.
 const MIN_SPEED_MPS: f64 = 0.2;
-/// Time in which the body follows the lateral acceleration in roll.
-const ROLL_TIME_S: f64 = 0.08;
 /// What the inertia of the turning wheels adds to the mass along the road, as a share of it. A command speaks of the car's own acceleration:
 /// the wheels' is on top of it, and everything else that pushes has to turn them, too. Wong, Theory of Ground Vehicles, section 3.1: 1.04 and more.
 const TURNING_SHARE: f64 = 0.06;
@@ -33,13 +31,17 @@ pub(crate) struct Mover<'m, 'a, T> {
     window: &'m Window,
     relaxes: bool,
     rolls: bool,
+    /// The body in pitch, where that matters.
+    pitch: Option<Sprung<T>>,
 }
 
-/// What is added to the accelerations throughout a sample.
+/// What goes with a sample up to the next.
 struct Extra<T> {
-    /// To those of v_y and yaw rate.
+    /// What is added to the accelerations of v_y and yaw rate throughout.
     push: [T; 2],
     flexible: Option<Push<T>>,
+    /// Longitudinal acceleration as the springs carry it, at both ends.
+    carried_a_x_mps2: [T; 2],
 }
 
 /// The inputs of an instant.
@@ -47,6 +49,7 @@ struct Instant<'e, T> {
     v_x_mps: T,
     steering_rad: T,
     a_x_mps2: f64,
+    carried_a_x_mps2: T,
     force_x_mps2: f64,
     minutes: f64,
     lap_share: f64,
@@ -86,6 +89,8 @@ pub(crate) struct Moving<T> {
     /// Heading, but for a constant.
     pub(crate) heading_rad: T,
     pub(crate) rates: Rates<T>,
+    /// The body in pitch.
+    pub(crate) pitch: [T; 2],
 }
 
 impl Moving<f64> {
@@ -100,7 +105,7 @@ impl Moving<f64> {
         };
         let rates =
             Rates { v_y_mps2: 0.0, yaw_radps2: 0.0, v_x_mps2: 0.0, a_y_mps2: 0.0, a_x_mps2: 0.0, memory };
-        Self { x: [0.0; 2], speed_mps: 0.0, heading_rad: 0.0, rates }
+        Self { x: [0.0; 2], speed_mps: 0.0, heading_rad: 0.0, rates, pitch: [0.0; 2] }
     }
 }
 
@@ -116,6 +121,7 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         window: &'m Window,
     ) -> Self {
         let (before, steering) = steering.split_at(run_in);
+        let dt_s = model.recording.runs[window.segment].dt_s;
         let lags = |what| model.effects.iter().any(|e| e.spec().lagging.contains(&what));
         Self {
             model,
@@ -128,6 +134,7 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
             window,
             relaxes: lags(Lagging::Slip) && car.relaxation_m.re() >= 0.0,
             rolls: lags(Lagging::Roll),
+            pitch: lags(Lagging::Pitch).then(|| Sprung::new(car.pitch_frequency_hz, dt_s)),
         }
     }
 
@@ -167,15 +174,19 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
     /// The car at the window's start.
     pub(crate) fn begin(&self, x: [T; 2], push: [T; 2]) -> Moving<T> {
         let zero = T::from(0.0);
-        let rates = self.settled(x, self.substeps().1, &self.extra(0, push));
-        Moving { x, speed_mps: zero, heading_rad: zero, rates }
+        let pitch = self.pitch_before();
+        let rates = self.settled(x, self.substeps().1, &self.extra(0, push, [pitch; 2]));
+        Moving { x, speed_mps: zero, heading_rad: zero, rates, pitch }
     }
 
     /// From sample `k` of the window to the next.
     pub(crate) fn advance(&self, k: usize, state: &mut Moving<T>, push: [T; 2]) {
         let (substeps, h_s) = self.substeps();
-        let extra = self.extra(k, push);
-        let Moving { x, speed_mps, heading_rad, rates } = state;
+        let from = state.pitch;
+        let to = self.pitched(from, self.window.from + k);
+        let extra = self.extra(k, push, [from, to]);
+        let Moving { x, speed_mps, heading_rad, rates, pitch } = state;
+        *pitch = to;
         for i in 0..substeps {
             let middle = self.instant(k, (i as f64 + 0.5) / substeps as f64, &extra);
             let half = [x[0] + rates.v_y_mps2 * (h_s / 2.0), x[1] + rates.yaw_radps2 * (h_s / 2.0)];
@@ -241,11 +252,33 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         [slip[0] - steady[0], slip[1] - steady[1]]
     }
 
-    fn extra(&self, k: usize, push: [T; 2]) -> Extra<T> {
+    /// The body in pitch at the window's start, from what was recorded before it.
+    fn pitch_before(&self) -> [T; 2] {
+        const FORGOTTEN_S: f64 = 0.5;
+        let run = &self.model.recording.runs[self.window.segment];
+        let start = self.window.from;
+        let first =
+            if self.pitch.is_some() { start - start.min((FORGOTTEN_S / run.dt_s) as usize) } else { start };
+        let still = [T::from(run.a_x_mps2[first]), T::from(0.0)];
+        (first..start).fold(still, |pitch, k| self.pitched(pitch, k))
+    }
+
+    /// The body in pitch a sample after `k` of the recording.
+    fn pitched(&self, pitch: [T; 2], k: usize) -> [T; 2] {
+        let a_x_mps2 = &self.model.recording.runs[self.window.segment].recorded_a_x_mps2;
+        let next = (k + 1).min(a_x_mps2.len() - 1);
+        self.pitch.map_or(pitch, |sprung| sprung.step(pitch, (a_x_mps2[k] + a_x_mps2[next]) / 2.0))
+    }
+
+    fn extra(&self, k: usize, push: [T; 2], pitch: [[T; 2]; 2]) -> Extra<T> {
         let run = &self.model.recording.runs[self.window.segment];
         let flexible = self.model.flexible.as_ref();
         let own = || self.model.flexible_parameters(self.p);
-        Extra { push, flexible: flexible.map(|f| f.push(own(), run, self.window.from + k)) }
+        Extra {
+            push,
+            flexible: flexible.map(|f| f.push(own(), run, self.window.from + k)),
+            carried_a_x_mps2: pitch.map(|x| self.pitch.map_or(x[0], |sprung| sprung.carried(x))),
+        }
     }
 
     fn instant<'e>(&self, k: usize, share: f64, extra: &'e Extra<T>) -> Instant<'e, T> {
@@ -265,11 +298,31 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
             v_x_mps: more.map_or(true_mps, |more| true_mps * more),
             steering_rad: self.steering[k] + (self.steering[next] - self.steering[k]) * share,
             a_x_mps2,
-            force_x_mps2: run.force_x_mps2[a],
+            carried_a_x_mps2: {
+                let [from, to] = extra.carried_a_x_mps2;
+                from + (to - from) * share
+            },
+            force_x_mps2: self.force_x_mps2(a, share),
             minutes: (run.time_s(a) + share * run.dt_s) / 60.0,
             lap_share: lap[a] + (turn - turn.round()) * share,
             place_rad: run.place_rad[a],
             extra,
+        }
+    }
+
+    /// The longitudinal force `share` of a step after sample `k`: its mean over the step within it; at a sample, where it may jump, between those of
+    /// the steps on both sides, as the acceleration is measured.
+    fn force_x_mps2(&self, k: usize, share: f64) -> f64 {
+        let recording = self.model.recording;
+        let force = &recording.runs[self.window.segment].force_x_mps2;
+        let at_sample = |k: usize| {
+            let (before, after) = (force[k.saturating_sub(1)], force[k.min(force.len() - 1)]);
+            before + (after - before) * recording.force_ahead
+        };
+        match share {
+            0.0 => at_sample(k),
+            1.0 => at_sample(k + 1),
+            _ => force[k],
         }
     }
 
@@ -292,6 +345,7 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
             rolled_a_y_mps2: memory.rolled_a_y_mps2,
             front_use: memory.front_use,
             a_x_mps2: now.a_x_mps2,
+            carried_a_x_mps2: now.carried_a_x_mps2,
             force_x_mps2: now.force_x_mps2,
             minutes: now.minutes,
             lap_share: now.lap_share,
@@ -368,7 +422,7 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
             motion.gravity_x_mps2 + now.a_x_mps2
         };
         let rolled = if self.rolls && h_s > 0.0 {
-            Lag::new(h_s, T::from(ROLL_TIME_S)).step(memory.rolled_a_y_mps2, memory.a_y_mps2, a_y)
+            Lag::new(h_s, car.roll_time_s).step(memory.rolled_a_y_mps2, memory.a_y_mps2, a_y)
         } else {
             memory.rolled_a_y_mps2
         };

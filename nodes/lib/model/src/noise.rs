@@ -127,11 +127,13 @@ mod tests {
             steering_rad: vec![0.0; n],
             a_x_mps2: vec![0.0; n],
             force_x_mps2: vec![0.0; n],
+            recorded_a_x_mps2: vec![0.0; n],
             lap_share: vec![0.0; n],
             heading_rad: vec![0.0; n],
             place_rad: vec![0.0; n],
             smooth: [vec![0.0; n], vec![0.0; n]],
             measured: vec![signal],
+            jumps: vec![false; n],
         }
     }
 

@@ -80,7 +80,9 @@ pub struct Run {
     pub steering_rad: Vec<f64>,
     /// Longitudinal acceleration (specific force), smoothed; from speed and yaw rate where none is recorded.
     pub a_x_mps2: Vec<f64>,
-    /// Commanded longitudinal force over the nominal mass; without a command the acceleration.
+    /// The same as it was recorded, where it was.
+    pub recorded_a_x_mps2: Vec<f64>,
+    /// Commanded longitudinal force over the nominal mass, from each sample to the next; without a command the acceleration.
     pub force_x_mps2: Vec<f64>,
     /// Distance along the lap over its length; 0 without a pose.
     pub lap_share: Vec<f64>,
@@ -92,6 +94,8 @@ pub struct Run {
     pub smooth: [Vec<f64>; 2],
     /// Measured signals by channel, in the order of [`Recording::channels`].
     pub measured: Vec<Vec<f64>>,
+    /// Where the longitudinal command jumps: what the acceleration is there is not asked.
+    pub jumps: Vec<bool>,
 }
 
 impl Run {
@@ -129,6 +133,8 @@ pub struct Recording {
     pub laps: Laps,
     /// Whether a longitudinal command is recorded.
     pub has_command: bool,
+    /// Where between the commands before a sample (0) and after it (1) the acceleration measured at the sample stands.
+    pub force_ahead: f64,
     /// Whether the lateral acceleration was computed from v_y, v_x and r instead of measured.
     pub derived_a_y: bool,
     /// Time recorded.
@@ -186,7 +192,7 @@ impl Recording {
         let has_command = !first.command_acceleration_mps2.is_empty();
         let identities = crate::identities::check(&parts);
         let channels = channels(first, has_command, &identities);
-        let runs: Vec<Run> =
+        let mut runs: Vec<Run> =
             parts.iter().zip(&laps.share).map(|(s, share)| run(s, &laps, share, &channels)).collect();
         let mut sigma: Vec<f64> = (0..channels.len()).map(|c| crate::noise::sigma(&runs, c)).collect();
         if let Some(c) = channels.iter().position(|c| *c == Channel::Heading) {
@@ -201,6 +207,11 @@ impl Recording {
             .map(|(c, s)| s.hypot(MODEL_SHARE * crate::noise::spread(&runs, c, channels[c].without_mean())))
             .collect();
         let weights = with_kinematic_weight(&channels, weights, &runs, &sigma);
+        let mut force_ahead = 0.0;
+        if let Some(c) = channels.iter().position(|c| *c == Channel::LongitudinalAcceleration) {
+            force_ahead = ahead(&runs, c);
+            runs.iter_mut().for_each(|run| run.jumps = jumps(&run.force_x_mps2, sigma[c]));
+        }
         let derived_a_y = identities.iter().any(|i| i.name == crate::identities::LATERAL && !i.informative);
         Ok(Self {
             runs,
@@ -209,6 +220,7 @@ impl Recording {
             weights,
             laps,
             has_command,
+            force_ahead,
             derived_a_y,
             recorded_s,
             least_speed_mps,
@@ -256,6 +268,38 @@ fn differs(a: &[f64], b: &[f64]) -> bool {
     apart > SHARE * fast
 }
 
+/// How far ahead of the command before it an acceleration stands that is measured at a sample, as a share of the way to the command after it: its
+/// stamps, and how it was interpolated, are not known. By least squares on what changes from sample to sample.
+fn ahead(runs: &[Run], c: usize) -> f64 {
+    let (mut product, mut square) = (0.0, 0.0);
+    for run in runs {
+        for (force, measured) in run.force_x_mps2.windows(3).zip(run.measured[c][1..].windows(2)) {
+            let (late, early) = (force[1] - force[0], force[2] - force[1]);
+            product += (early - late) * (measured[1] - measured[0] - late);
+            square += (early - late).powi(2);
+        }
+    }
+    if square > 0.0 { (product / square).clamp(0.0, 1.0) } else { 0.0 }
+}
+
+/// Where a command jumps: measurements are interpolated, so that when it jumped is known to half a step, and half the jump would be noise. `sigma`: of
+/// the acceleration. What a command does all the time is no jump.
+fn jumps(force_x_mps2: &[f64], sigma: f64) -> Vec<bool> {
+    const STANDARD_DEVIATIONS: f64 = 3.0;
+    /// Median of the size of a normal deviate.
+    const MEDIAN: f64 = 0.6745;
+    let bends: Vec<f64> = force_x_mps2.windows(3).map(|f| (f[2] - 2.0 * f[1] + f[0]).abs()).collect();
+    let usual = median(bends.clone()) / MEDIAN;
+    let most = STANDARD_DEVIATIONS * sigma.max(usual);
+    let mut out = vec![false; force_x_mps2.len()];
+    // The bend of three steps, the second from sample k + 1 on: they touch samples k to k + 3.
+    for (k, _) in bends.iter().enumerate().filter(|(_, bend)| **bend > most) {
+        let last = (k + 3).min(out.len() - 1);
+        out[k..=last].fill(true);
+    }
+    out
+}
+
 fn run(s: &Segment, laps: &Laps, lap_share: &[f64], channels: &[Channel]) -> Run {
     let half = (SMOOTH_S / s.dt_s).round().max(1.0) as usize;
     let (v_x_mps, v_x_rate) = local_quadratic(&s.v_x_mps, half, s.dt_s);
@@ -288,6 +332,7 @@ fn run(s: &Segment, laps: &Laps, lap_share: &[f64], channels: &[Channel]) -> Run
         dt_s: s.dt_s,
         v_x_mps,
         steering_rad: s.steering_rad.clone(),
+        recorded_a_x_mps2: if s.a_x_mps2.is_empty() { a_x_mps2.clone() } else { s.a_x_mps2.clone() },
         a_x_mps2,
         force_x_mps2,
         lap_share: lap_share.to_vec(),
@@ -299,6 +344,7 @@ fn run(s: &Segment, laps: &Laps, lap_share: &[f64], channels: &[Channel]) -> Run
         heading_rad,
         smooth: [&s.v_y_mps, &s.yaw_rate_radps].map(|c| local_quadratic(c, half, s.dt_s).0),
         measured,
+        jumps: vec![false; s.len()],
     }
 }
 

@@ -22,22 +22,27 @@ macro_rules! segment {
             /// Step of the grid.
             pub dt_s: f64,
             $(#[doc = concat!("`", $unit, "`: ", $meaning)] pub $name: Vec<f64>,)*
-            /// [m/s] commanded speed in force
+            /// [m/s] commanded speed, its mean from the sample to the next
             pub command_speed_mps: Vec<f64>,
-            /// [m/s^2] commanded acceleration in force
+            /// [m/s^2] commanded acceleration, its mean from the sample to the next
             pub command_acceleration_mps2: Vec<f64>,
         }
 
         impl Segment {
-            /// Puts every channel of a sequence through `even`; what was commanded has been put on its samples before.
-            fn of(sequence: &StateSequence, held: &[Vec<f32>; 2], start_time_s: f64, dt_s: f64, even: &dyn Fn(&[f32]) -> Vec<f64>) -> Self {
-                let [speed_mps, acceleration_mps2] = held;
+            /// Puts every channel of a sequence through `even`, what was commanded through `held`.
+            fn of(
+                sequence: &StateSequence,
+                start_time_s: f64,
+                dt_s: f64,
+                even: &dyn Fn(&[f32]) -> Vec<f64>,
+                held: &dyn Fn(&[f32]) -> Vec<f64>,
+            ) -> Self {
                 Self {
                     start_time_s,
                     dt_s,
                     $($name: even(&sequence.$name),)*
-                    command_speed_mps: even(speed_mps),
-                    command_acceleration_mps2: even(acceleration_mps2),
+                    command_speed_mps: held(&sequence.command_speed_mps),
+                    command_acceleration_mps2: held(&sequence.command_acceleration_mps2),
                 }
             }
         }
@@ -81,7 +86,8 @@ pub(crate) fn median_step_s(time_s: &[f32]) -> f64 {
 }
 
 /// Splits a sequence at its gaps (a pause over 2.5 median steps) and puts each stretch on an even grid of the median step, by linear
-/// interpolation (the steering too: it stands on odometry stamps already). Stretches shorter than `min_length_s` are left out.
+/// interpolation (the steering too: it stands on odometry stamps already). A longitudinal command stays what it was from its stamp to the next one's
+/// and is averaged over each step. Stretches shorter than `min_length_s` are left out.
 ///
 /// # Errors
 /// What [`StateSequence::check`] finds.
@@ -93,19 +99,17 @@ pub fn segments(sequence: &StateSequence, min_length_s: f64) -> Result<Vec<Segme
         return Err(SignalError::Config { name: "median time step_s", must: "at least 1e-5", got: dt_s });
     }
     let time_s = &sequence.time_s;
-    let held = [&sequence.command_speed_mps, &sequence.command_acceleration_mps2]
-        .map(|values| held(sequence, values));
     let mut bounds = vec![0];
     bounds.extend((1..time_s.len()).filter(|&k| f64::from(time_s[k] - time_s[k - 1]) > GAP_STEPS * dt_s));
     bounds.push(time_s.len());
     Ok(bounds
         .windows(2)
         .filter(|w| f64::from(time_s[w[1] - 1] - time_s[w[0]]) >= min_length_s && w[1] - w[0] >= 2)
-        .map(|w| segment(sequence, &held, w[0], w[1], dt_s))
+        .map(|w| segment(sequence, w[0], w[1], dt_s))
         .collect())
 }
 
-fn segment(sequence: &StateSequence, held: &[Vec<f32>; 2], from: usize, to: usize, dt_s: f64) -> Segment {
+fn segment(sequence: &StateSequence, from: usize, to: usize, dt_s: f64) -> Segment {
     let time_s = &sequence.time_s[from..to];
     let start_time_s = f64::from(time_s[0]);
     let count = ((f64::from(time_s[time_s.len() - 1]) - start_time_s) / dt_s + 1e-2).floor() as usize + 1;
@@ -132,14 +136,27 @@ fn segment(sequence: &StateSequence, held: &[Vec<f32>; 2], from: usize, to: usiz
             })
             .collect()
     };
-    Segment::of(sequence, held, start_time_s, dt_s, &even)
+    let held = |values: &[f32]| held(&sequence.command_time_s, values, start_time_s, dt_s, count);
+    Segment::of(sequence, start_time_s, dt_s, &even, &held)
 }
 
-/// A commanded quantity at every sample: the command in force, the first one before it.
-fn held(sequence: &StateSequence, values: &[f32]) -> Vec<f32> {
-    let stamps_s = &sequence.command_time_s;
-    let at = |t_s: f32| values[stamps_s.partition_point(|&t| t <= t_s).saturating_sub(1)];
-    if values.is_empty() { Vec::new() } else { sequence.time_s.iter().map(|&t| at(t)).collect() }
+/// A commanded quantity from every sample to the next, on average: each command holds from its stamp to the next one's, the first one before it, too.
+fn held(stamps_s: &[f32], values: &[f32], start_time_s: f64, dt_s: f64, count: usize) -> Vec<f64> {
+    if values.is_empty() {
+        return Vec::new();
+    }
+    let mut k = stamps_s.partition_point(|&t| f64::from(t) <= start_time_s).saturating_sub(1);
+    let mean = |i: usize| {
+        let (mut t_s, end_s) = (start_time_s + i as f64 * dt_s, start_time_s + (i + 1) as f64 * dt_s);
+        let mut integral = 0.0;
+        while let Some(next_s) = stamps_s.get(k + 1).map(|&t| f64::from(t)).filter(|&t| t < end_s) {
+            integral += f64::from(values[k]) * (next_s - t_s).max(0.0);
+            t_s = t_s.max(next_s);
+            k += 1;
+        }
+        (integral + f64::from(values[k]) * (end_s - t_s)) / dt_s
+    };
+    (0..count).map(mean).collect()
 }
 
 #[cfg(test)]
@@ -171,6 +188,25 @@ mod tests {
             }
         }
         assert!(segments(&ramp(&times), 1.5).unwrap().is_empty());
+    }
+
+    #[test]
+    fn a_command_holds_from_its_own_stamp() {
+        let times: Vec<f32> = (0..100).map(|k| k as f32 * 0.01).collect();
+        let mut sequence = ramp(&times);
+        // Before the first command, its value; then a jump a quarter of a step after a sample.
+        sequence.command_time_s = vec![0.105, 0.5025];
+        sequence.command_acceleration_mps2 = vec![1.0, -3.0];
+        sequence.command_speed_mps = vec![0.0, 0.0];
+        let part = &segments(&sequence, 0.5).unwrap()[0];
+        for (k, &found) in part.command_acceleration_mps2.iter().enumerate() {
+            let expected = match k {
+                0..50 => 1.0,
+                50 => 0.25 - 3.0 * 0.75,
+                _ => -3.0,
+            };
+            approx::assert_abs_diff_eq!(found, expected, epsilon = 1e-4);
+        }
     }
 
     #[test]

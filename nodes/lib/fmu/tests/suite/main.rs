@@ -52,7 +52,7 @@ fn car() -> CarFile {
         ("steering_lag", own(&[("tau_s", 0.03), ("q", 0.2)])),
         ("steering_backlash", own(&[("half_width_rad", 0.004)])),
         ("tire_relaxation", own(&[("sigma_m", 0.07)])),
-        ("longitudinal_load_transfer", own(&[("h_m", 0.05)])),
+        ("longitudinal_load_transfer", own(&[("h_m", 0.05), ("pitch_frequency_hz", 4.0)])),
         ("odometry_low_pass", own(&[("tau_s", 0.04)])),
     ];
     CarFile {

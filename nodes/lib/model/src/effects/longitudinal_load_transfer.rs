@@ -3,9 +3,9 @@
 use gripsight_vehicle::Real;
 
 use super::common::{LOAD_SENSITIVITY_SHARE, add_load};
-use super::{Effect, EffectSpec, Figure, Unknown, positive, spec};
+use super::{Effect, EffectSpec, Figure, Lagging, ParameterSpec, Unknown, positive, spec};
 use crate::site::Site;
-use crate::terms::{Axles, Car, Moment};
+use crate::terms::{Axles, Car, Moment, PITCH_FREQUENCY_HZ};
 
 /// Load that moves between the axles under braking and power.
 #[derive(Debug)]
@@ -18,20 +18,36 @@ impl Effect for LongitudinalLoadTransfer {
         usual: Some(|car, _| 0.33 * car.h_cg_m),
         unknown: Unknown { share: LOAD_SENSITIVITY_SHARE, samples: 0.0 },
         spread: 0.19,
+        lagging: &[Lagging::Pitch],
+        sizing: 1,
         ..spec(
             "longitudinal_load_transfer",
-            "F_zf -= (m a_x + drag) h/L, F_zr += (m a_x + drag) h/L",
-            "moment balance in pitch",
+            "F_zf -= (m a + drag) h/L, F_zr += (m a + drag) h/L, a: a_x as the springs carry it, which pitch at f",
+            "moment balance in pitch; Milliken, Race Car Vehicle Dynamics, chapter 16",
             "trail braking, power in the corner",
             &[Site::LoadsAndBody],
-            &[positive("h_m", "m", [0.06, 0.3])],
+            &[
+                positive("h_m", "m", [0.06, 0.3]),
+                // Passenger cars pitch at 1.5 Hz, race cars at 5 and more.
+                ParameterSpec {
+                    name: "pitch_frequency_hz",
+                    unit: "Hz",
+                    null: PITCH_FREQUENCY_HZ,
+                    size: [1.0, 1.0],
+                    range: [-2.7, 6.0],
+                },
+            ],
         )
     };
+
+    fn car<T: Real>(p: &[T], car: &mut Car<T>) {
+        car.pitch_frequency_hz = p[1];
+    }
 
     fn loads<T: Real>(p: &[T], car: &Car<T>, at: &Moment<T>, axles: &mut Axles<T>) {
         // Only forces on the tires have a lever: drag acts near the centre of gravity, and the tires push against it.
         let drag_n = car.drag_1pm * at.v_x_mps * at.v_x_mps * car.nominal_mass_kg;
-        let moved_n = p[0] * (car.mass_kg * at.a_x_mps2 + drag_n) / car.wheelbase_m();
+        let moved_n = p[0] * (car.mass_kg * at.carried_a_x_mps2 + drag_n) / car.wheelbase_m();
         add_load(car, axles, -moved_n, moved_n);
     }
 }
@@ -54,9 +70,9 @@ mod tests {
         let mut car = car();
         AeroDrag::car(&[C_1PM], &mut car);
         let front_n = |a_x_mps2: f64| {
-            let at = Moment { v_x_mps: V_X_MPS, a_x_mps2, ..moment() };
+            let at = Moment { v_x_mps: V_X_MPS, carried_a_x_mps2: a_x_mps2, ..moment() };
             let mut axles = car.axles_at_rest();
-            LongitudinalLoadTransfer::loads(&[0.06], &car, &at, &mut axles);
+            LongitudinalLoadTransfer::loads(&[0.06, 4.0], &car, &at, &mut axles);
             axles.front.load_n
         };
         let at_rest_n = car.axles_at_rest().front.load_n;

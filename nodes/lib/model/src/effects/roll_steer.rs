@@ -3,9 +3,9 @@
 use gripsight_vehicle::Real;
 
 use super::common::PER_G;
-use super::{Effect, EffectSpec, Lagging, both_sides, spec};
+use super::{Effect, EffectSpec, Lagging, ParameterSpec, both_sides, spec};
 use crate::site::Site;
-use crate::terms::{Axles, Car, Moment};
+use crate::terms::{Axles, Car, Moment, ROLL_TIME_S};
 
 /// The rear wheels steer as the body rolls.
 #[derive(Debug)]
@@ -14,16 +14,30 @@ pub(super) struct RollSteer;
 impl Effect for RollSteer {
     const SPEC: EffectSpec = EffectSpec {
         lagging: &[Lagging::Roll],
-        spread: 0.06,
+        sizing: 1,
+        spread: 0.1,
         ..spec(
             "roll_steer",
-            "d_r = k a_y/g behind the roll of the body",
+            "d_r = k a_y/g behind the roll of the body, which follows in a time T",
             "kinematics of the rear suspension; Milliken, Race Car Vehicle Dynamics, chapter 23",
             "medium lateral acceleration, transients",
             &[Site::RearAxle],
-            &[both_sides("rad_per_g", "rad/g", [0.008, 0.004])],
+            &[
+                both_sides("rad_per_g", "rad/g", [0.008, 0.004]),
+                ParameterSpec {
+                    name: "roll_time_s",
+                    unit: "s",
+                    null: ROLL_TIME_S,
+                    size: [0.02, 0.02],
+                    range: [-2.0, 5.0],
+                },
+            ],
         )
     };
+
+    fn car<T: Real>(p: &[T], car: &mut Car<T>) {
+        car.roll_time_s = p[1];
+    }
 
     fn loads<T: Real>(p: &[T], _car: &Car<T>, at: &Moment<T>, axles: &mut Axles<T>) {
         axles.rear.steer_rad += p[0] * at.rolled_a_y_mps2 * PER_G;
@@ -41,7 +55,7 @@ mod tests {
         assert_absent_at_null::<RollSteer>();
         let mut axles = car().axles_at_rest();
         let at = Moment { rolled_a_y_mps2: 0.5 * GRAVITY_MPS2, ..moment() };
-        RollSteer::loads(&[0.02], &car(), &at, &mut axles);
+        RollSteer::loads(&[0.02, 0.05], &car(), &at, &mut axles);
         assert_eq!(axles.front.steer_rad, 0.0);
         approx::assert_relative_eq!(axles.rear.steer_rad, 0.01, epsilon = 1e-12);
     }

@@ -95,6 +95,8 @@ pub enum Lagging {
     Slip,
     /// The lateral acceleration behind the roll of the body.
     Roll,
+    /// The longitudinal acceleration as the springs carry it in pitch.
+    Pitch,
 }
 
 /// What no fit of the model can know of an effect's size, as a standard deviation.

@@ -21,6 +21,7 @@ pub(super) fn moment() -> Moment<f64> {
         rolled_a_y_mps2: 5.0,
         front_use: 0.6,
         a_x_mps2: -2.0,
+        carried_a_x_mps2: -2.0,
         force_x_mps2: -2.0,
         minutes: 2.0,
         lap_share: 0.3,
