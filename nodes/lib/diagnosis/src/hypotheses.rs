@@ -65,8 +65,10 @@ pub(crate) fn terms(
                     let unknown = unknown.sigma(0.0, recording.dt_s(), recording.typical_speed_mps());
                     usual.hypot(unknown).hypot(effect.spec().spread * size)
                 };
+                // Where a place is has no usual value: it is looked for from where it promises most.
+                let somewhere = effect.is_of_a_place() && i >= effect.sizing();
                 ColumnPrior {
-                    offset: absent[i] - value,
+                    offset: if somewhere { 0.0 } else { absent[i] - value },
                     sigma: if selectable { vec![narrow, wide.max(narrow)] } else { vec![narrow] },
                     bounds: [
                         spec.null + spec.range[0] * size - value,

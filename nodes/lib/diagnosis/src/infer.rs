@@ -26,7 +26,7 @@ use gripsight_estimation::Windows;
 use gripsight_estimation::selection::{Configuration, Quadratic, Term, configuration, select};
 use gripsight_model::BASE;
 use gripsight_model::EffectId;
-use gripsight_model::{Flexible, Site};
+use gripsight_model::{Flexible, Site, Window};
 
 /// Place of the first effect among the terms: after tires and hold.
 pub(crate) const FIRST: usize = 2;
@@ -125,7 +125,7 @@ pub(crate) fn infer(
             let confirmed = around.confirmed(&weighed.total, &selection, &losses)?;
             progress("asking data that nothing was fitted to");
             let Stated { chosen: best, fitted, statements: mut stated } =
-                around.stated(&weighed, best, closed, scorer, &confirmed)?;
+                around.stated(&weighed, best, closed, scorer)?;
             let sizes = Sizes::of(&around, library, &best, &fitted, windows)?;
             for statement in &mut stated {
                 let effect = columns.effects[statement.term - FIRST];
@@ -274,7 +274,8 @@ fn differences(
     windows: &Windows,
     joint: &mut Joint,
 ) {
-    let here = crate::patch::predictions(engine, columns, values, starts, windows, None);
+    let everywhere = |_: &Window| true;
+    let here = crate::patch::predictions(engine, columns, values, starts, (windows, &everywhere), None);
     for &effect in columns.effects.iter().filter(|e| e.spec().flat_at_null) {
         let Some(range) = columns.of_effect(effect) else { continue };
         let null = effect.spec().parameters[0].null;
@@ -299,7 +300,7 @@ fn differences(
             .map(|m| {
                 let to = m * size;
                 let at = (effect, range.start);
-                crate::patch::quotient(engine, columns, values, starts, windows, &here, at, to)
+                crate::patch::quotient(engine, columns, values, starts, (windows, &everywhere), &here, at, to)
             })
             .map(|slopes| (joint.promise(engine, &slopes), slopes))
             .max_by(|a, b| a.0.total_cmp(&b.0));

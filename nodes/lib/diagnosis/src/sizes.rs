@@ -58,7 +58,8 @@ impl Sizes {
         }
         let lacking = |(i, effect): (usize, &EffectId)| {
             let (term, range) = (FIRST + i, columns.of_effect(*effect)?);
-            let seen = range.clone().all(|c| weighed.total.information[(c, c)] > 0.0);
+            // Later parameters shape it, and show only where it is.
+            let seen = range.clone().take(effect.sizing()).all(|c| weighed.total.information[(c, c)] > 0.0);
             if chosen[term] > 0 || terms[term].log_weights.len() == 1 || !seen {
                 return None;
             }

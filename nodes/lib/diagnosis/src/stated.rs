@@ -1,6 +1,6 @@
 //! What survives on data that nothing was fitted to.
 
-use gripsight_estimation::selection::Term;
+use gripsight_estimation::selection::{Term, configuration};
 use gripsight_model::Site;
 use rayon::prelude::*;
 
@@ -14,6 +14,9 @@ use crate::statement::Statement;
 
 /// Effects, the likeliest to be taken in and those needed least, that are asked for by a fit and not by a look alone.
 const FITTED: usize = 3;
+
+/// Effects that are looked at, those that the linearisation promises most of.
+const LOOKED_AT: usize = 8;
 
 /// Standard deviations of what any car has of an effect, beyond which it has more.
 const USUAL: f64 = 2.0;
@@ -57,16 +60,15 @@ impl Around<'_, '_> {
     }
 
     /// Asks data that nothing was fitted to. Their predictive ratio, times the odds before the data are looked at, decides what is in the model.
-    /// `start`: the most probable configuration by the fitted data; `alone`: that of effects alone; `probability`: of each term, by the fitted data.
+    /// `start`: the most probable configuration by the fitted data; `alone`: that of effects alone.
     pub(crate) fn stated(
         &self,
         weighed: &Weighed,
         start: Vec<usize>,
         alone: Option<Vec<usize>>,
         scorer: &Scorer<'_>,
-        probability: &[f64],
     ) -> Option<Stated> {
-        let asked = Asked { around: self, weighed, scorer, probability, worst: f64::INFINITY };
+        let asked = Asked { around: self, weighed, scorer, worst: f64::INFINITY };
         let worst = asked.fitted(vec![0; start.len()])?.cost;
         let asked = Asked { worst, ..asked };
         let mut now = asked.fitted(start)?;
@@ -105,8 +107,6 @@ struct Asked<'q, 'p, 'a, 's> {
     around: &'q Around<'p, 'a>,
     weighed: &'q Weighed,
     scorer: &'q Scorer<'s>,
-    /// Of each term, by the fitted data.
-    probability: &'q [f64],
     /// Cost with no effect at all.
     worst: f64,
 }
@@ -160,8 +160,9 @@ impl Asked<'_, '_, '_, '_> {
 
     /// Whether a drive asks for more of an effect than any car has: its size is where it may be at most without it.
     fn is_at_its_most(&self, of: &Tried, term: usize) -> bool {
+        let sizing = self.around.columns.effects[term - FIRST].sizing();
         let term = &self.around.terms[term];
-        term.priors.iter().enumerate().any(|(k, p)| {
+        term.priors.iter().take(sizing).enumerate().any(|(k, p)| {
             let step = of.fitted.values[term.from + k] - self.around.values[term.from + k] - p.offset;
             step.abs() > 0.99 * USUAL * p.sigma[0]
         })
@@ -187,18 +188,31 @@ impl Asked<'_, '_, '_, '_> {
         }
     }
 
+    /// Effects that a model lacks and may need: those that the linearisation promises most of beside what it has, and those of which it asks for more
+    /// than any car has. How likely each is beside all others does not count: what stands in for an effect would keep it out.
+    fn offered(&self, now: &Tried, with: impl Fn(usize) -> Vec<usize> + Sync) -> Vec<usize> {
+        let evidence = |chosen: &[usize]| {
+            let around = self.around;
+            configuration(&self.weighed.total, around.dispersion, around.terms, chosen)
+                .map(|c| c.log_evidence)
+        };
+        let mut promised: Vec<(usize, f64)> =
+            self.effects(now, false).into_par_iter().filter_map(|i| Some((i, evidence(&with(i))?))).collect();
+        promised.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let promising = promised.iter().take(LOOKED_AT).map(|p| p.0);
+        let at_most = promised.iter().skip(LOOKED_AT).map(|p| p.0).filter(|&i| self.is_at_its_most(now, i));
+        promising.chain(at_most).collect()
+    }
+
     /// Takes in the effects that all data make likelier than not, the likeliest first.
     fn with_likely_effects(&self, mut now: Tried) -> Option<Tried> {
         loop {
-            let offered = self.effects(&now, false).into_iter();
-            let asked_for =
-                |&i: &usize| self.probability[i] >= decisions::LISTED || self.is_at_its_most(&now, i);
-            let offered: Vec<usize> = offered.filter(asked_for).collect();
             let with = |i: usize| {
                 let mut fuller = now.chosen.clone();
                 fuller[i] = 1;
                 fuller
             };
+            let offered = self.offered(&now, with);
             // A look beside a look: what it falls short of a fit by is the same on both sides.
             let near = self.nearby(now.chosen.clone())?.cost;
             let mut looked_at: Vec<(usize, f64)> = offered

@@ -190,13 +190,13 @@ fn drives_in_one_state_are_explained_together_and_one_in_another_contradicts() {
         let request = Request { together: Some(together), ..Request::new(&joined.sequence, &vehicle) };
         diagnose(&request, &mut |_| {}).unwrap()
     };
-    let differs = |d: &Diagnosis| {
+    let differs = |d: &Diagnosis| -> Vec<Vec<&str>> {
         d.drives.iter().map(|d| d.contradicts.as_ref().unwrap().iter().map(|c| c.name).collect()).collect()
     };
     let alike = explained(&alone[..2]);
     assert_eq!(named(&alike), ["steering_lag"], "{}", text(&alike));
     let nothing: Vec<Vec<&str>> = vec![Vec::new(); 2];
-    assert_eq!(nothing, differs(&alike) as Vec<Vec<&str>>, "{}", text(&alike));
+    assert_eq!(nothing, differs(&alike), "{}", text(&alike));
     for drive in &alike.drives {
         assert!(
             (drive.duration_s - 20.0).abs() < 0.5 && drive.after.value < drive.retuned.value,
@@ -209,13 +209,8 @@ fn drives_in_one_state_are_explained_together_and_one_in_another_contradicts() {
     let compared: Vec<bool> = beside.drives.iter().map(|d| d.contradicts.is_some()).collect();
     assert_eq!(compared, [true, false], "{}", text(&beside));
     let mixed = explained(&alone);
-    let contradicts: Vec<Vec<&str>> = differs(&mixed);
-    assert!(contradicts[2].contains(&"steering_lag"), "{}", text(&mixed));
-    assert!(
-        mixed.drives[2].contradicts.as_ref().unwrap()[0].difference.value < -0.04,
-        "{:?}",
-        mixed.drives[2]
-    );
+    let odd = mixed.drives[2].contradicts.as_ref().unwrap();
+    assert!(odd.iter().any(|c| c.site == "steering" && c.probability > 0.9), "{}", text(&mixed));
 }
 
 #[test]
