@@ -79,8 +79,11 @@ fn fmpy_validates_the_unit_and_drives_it_like_the_model() {
     let (sequences, _) = read_sequences(&bag, &TopicMap::default(), whole).unwrap();
     let mut recording = Recording::new(sequences.last().unwrap()).unwrap();
     // Before the first sample nothing is known: the wheels are held there.
+    // The unit is told the smoothed acceleration, and the force from each sample on.
+    recording.force_ahead = 0.0;
     let run = &mut recording.runs[0];
     run.steering_rad[1] = run.steering_rad[0];
+    run.recorded_a_x_mps2.clone_from(&run.a_x_mps2);
     let run = run.clone();
     let car = car();
     let driven = car.driven().unwrap();
