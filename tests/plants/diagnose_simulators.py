@@ -9,6 +9,7 @@ run can be stopped and resumed. Packages: see make_simulator_pairs.py.
 
 import argparse
 import csv
+import itertools
 import json
 import math
 import subprocess
@@ -26,15 +27,13 @@ GROUPS = {
     "slipx": [{"mass", "izz"}],
 }
 AROUND = {"delay_s": "steering_delay", "gain": "steering_gain", "offset_rad": "steering_offset", "x_m": "v_y_lever_arm", "scale": "gyro_scale"}
+GYM = {"steer_buffer_size": 8, "C_Sf": 3.7744, "m": 3.47, "sv_max": 1.5}
 TABLES = {
     "f1tenth_gym": [
-        ("f1tenth_gym", {"steer_buffer_size": 8}), ("f1tenth_gym", {"C_Sf": 3.7744}), ("f1tenth_gym", {"m": 3.47}),
-        ("f1tenth_gym", {"sv_max": 1.5}),
+        *(("f1tenth_gym", {name: value}) for name, value in GYM.items()),
+        *(("f1tenth_gym", dict(two)) for two in itertools.combinations(GYM.items(), 2)),
     ],
-    "f1tenth_gym_more": [
-        ("f1tenth_gym", {}), ("f1tenth_gym", {"steer_buffer_size": 8, "C_Sf": 3.7744}), ("f1tenth_gym", {"C_Sf": 3.7744, "sv_max": 1.5}),
-        ("f1tenth_gym", {"gain": -0.5}), ("f1tenth_gym", {"gain": -0.5, "C_Sf": 3.7744}),
-    ],
+    "gain": [("f1tenth_gym", {"gain": -0.5}), ("f1tenth_gym", {"gain": -0.5, "C_Sf": 3.7744})],
     "others": [
         ("slipx", {"tyre_front.mu_y0": 0.9}), ("slipx", {"izz": 0.065}), ("slipx", {"x_m": -0.16}), ("slipx", {}),
         ("commonroad_st", {"tire.p_ky1": -17.0}), ("commonroad_st", {"I_z": 2200.0}), ("commonroad_st", {"delay_s": 0.05}),
@@ -122,7 +121,8 @@ def main():
     parser.add_argument("--smooth", action="store_true")
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
-    cases = [(k, c, s) for k, c in TABLES[arguments.table] for s in range(1, arguments.seeds + 1)]
+    # Seed by seed: a run that is stopped has something of every row.
+    cases = [(k, c, s) for s in range(1, arguments.seeds + 1) for k, c in TABLES[arguments.table]]
     rows = []
     for i, (kind, changes, seed) in enumerate(cases):
         row = run(arguments.gripsight, arguments.out / f"pair_{i:03}", kind, changes, seed, arguments)

@@ -58,7 +58,8 @@ pub use car_file::CarFile;
 pub use correction::{Correction, CorrectionStream};
 pub use drive::{Along, Controls, Drive, Driven, DrivenCar};
 pub use effects::{
-    Effect, EffectId, EffectSpec, Figure, Lagging, Need, ParameterSpec, Reported, Unknown, Usual, Wheels,
+    Effect, EffectId, EffectSpec, Figure, Lagging, Need, OutsideTerm, ParameterSpec, Reported, Unknown,
+    Usual, Wheels,
 };
 pub use error::ModelError;
 pub use flexible::{Flexible, Group};

@@ -3,7 +3,7 @@
 use gripsight_vehicle::Real;
 
 use super::common::COMMAND;
-use super::{Effect, EffectId, EffectSpec, ParameterSpec, spec};
+use super::{Effect, EffectId, EffectSpec, OutsideTerm, ParameterSpec, spec};
 use crate::site::Site;
 use crate::terms::{Car, Moment, Motion};
 
@@ -13,6 +13,7 @@ pub(super) struct AeroDrag;
 
 impl Effect for AeroDrag {
     const SPEC: EffectSpec = EffectSpec {
+        outside: Some(OutsideTerm::Drag),
         along: true,
         company: Some(EffectId::RollingResistance),
         alike: &[EffectId::RollingResistance],

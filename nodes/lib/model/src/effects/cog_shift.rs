@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectSpec, Figure, ParameterSpec, both_sides, spec};
+use super::{Effect, EffectSpec, Figure, OutsideTerm, ParameterSpec, both_sides, spec};
 use crate::site::Site;
 use crate::terms::Car;
 
@@ -12,6 +12,7 @@ pub(super) struct CogShift;
 
 impl Effect for CogShift {
     const SPEC: EffectSpec = EffectSpec {
+        outside: Some(OutsideTerm::AxleDistances),
         figure: Some(Figure {
             name: "l_f_m",
             stated: |car| Some(car.l_f_m),

@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectSpec, both_sides, spec};
+use super::{Effect, EffectSpec, OutsideTerm, both_sides, spec};
 use crate::site::Site;
 use crate::terms::Outputs;
 
@@ -11,14 +11,17 @@ use crate::terms::Outputs;
 pub(super) struct GyroBias;
 
 impl Effect for GyroBias {
-    const SPEC: EffectSpec = spec(
-        "gyro_bias",
-        "r_m = r + b",
-        "bias of the gyroscope",
-        "straights",
-        &[Site::YawRate],
-        &[both_sides("bias_radps", "rad/s", [0.02, 0.005])],
-    );
+    const SPEC: EffectSpec = EffectSpec {
+        outside: Some(OutsideTerm::YawRateBias),
+        ..spec(
+            "gyro_bias",
+            "r_m = r + b",
+            "bias of the gyroscope",
+            "straights",
+            &[Site::YawRate],
+            &[both_sides("bias_radps", "rad/s", [0.02, 0.005])],
+        )
+    };
 
     fn sense<T: Real>(p: &[T], out: &mut Outputs<T>) {
         for r in &mut out.yaw_rate_radps {

@@ -3,7 +3,7 @@
 use gripsight_vehicle::Real;
 
 use super::common::scale;
-use super::{Effect, EffectSpec, ParameterSpec, spec};
+use super::{Effect, EffectSpec, OutsideTerm, ParameterSpec, spec};
 use crate::site::Site;
 use crate::terms::{Axles, Car, Moment};
 
@@ -13,6 +13,7 @@ pub(super) struct LateralLoadTransfer;
 
 impl Effect for LateralLoadTransfer {
     const SPEC: EffectSpec = EffectSpec {
+        outside: Some(OutsideTerm::LateralLoadTransfer),
         usual: Some(|_, size| 0.27 * size),
         spread: 0.19,
         ..spec(

@@ -3,7 +3,7 @@
 use gripsight_vehicle::Real;
 
 use super::common::{LOAD_SENSITIVITY_SHARE, add_load};
-use super::{Effect, EffectSpec, Figure, Lagging, ParameterSpec, Unknown, positive, spec};
+use super::{Effect, EffectSpec, Figure, Lagging, OutsideTerm, ParameterSpec, Unknown, positive, spec};
 use crate::site::Site;
 use crate::terms::{Axles, Car, Moment, PITCH_FREQUENCY_HZ};
 
@@ -13,6 +13,7 @@ pub(super) struct LongitudinalLoadTransfer;
 
 impl Effect for LongitudinalLoadTransfer {
     const SPEC: EffectSpec = EffectSpec {
+        outside: Some(OutsideTerm::CogHeight),
         figure: Some(Figure { name: "h_cg_m", stated: |car| Some(car.h_cg_m), value: |_, h_cg_m| h_cg_m }),
         // About a third of what the height of the centre of gravity gives.
         usual: Some(|car, _| 0.33 * car.h_cg_m),

@@ -3,7 +3,7 @@
 use gripsight_vehicle::Real;
 
 use super::common::{COMMAND, ratio};
-use super::{Effect, EffectSpec, Figure, spec};
+use super::{Effect, EffectSpec, Figure, OutsideTerm, spec};
 use crate::site::Site;
 use crate::terms::Car;
 
@@ -13,6 +13,7 @@ pub(super) struct MassError;
 
 impl Effect for MassError {
     const SPEC: EffectSpec = EffectSpec {
+        outside: Some(OutsideTerm::Mass),
         figure: Some(Figure {
             name: "mass_kg",
             stated: |car| Some(car.mass_kg),

@@ -60,7 +60,7 @@ use gripsight_vehicle::{Real, VehicleParameters};
 use crate::ModelError;
 use crate::terms::{Axles, Car, Moment, Motion, Outputs};
 
-pub use spec::{EffectSpec, Figure, Lagging, Need, ParameterSpec, Reported, Unknown, Usual};
+pub use spec::{EffectSpec, Figure, Lagging, Need, OutsideTerm, ParameterSpec, Reported, Unknown, Usual};
 use spec::{both_sides, positive, spec};
 
 /// What an effect between the steering and the road wheels remembers from angle to angle.
@@ -246,6 +246,12 @@ impl EffectId {
             name: name.to_owned(),
             known: Self::candidates().map(|e| e.name()).collect::<Vec<_>>().join(", "),
         })
+    }
+
+    /// The effect that is a quantity with a name outside of the library.
+    #[must_use]
+    pub fn of_outside(term: OutsideTerm) -> Option<Self> {
+        Self::ALL.iter().copied().find(|e| e.spec().outside == Some(term))
     }
 
     /// Those that may be named as a cause, in the library's order.

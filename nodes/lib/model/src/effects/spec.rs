@@ -88,6 +88,41 @@ pub struct Figure {
     pub value: fn(&VehicleParameters, f64) -> f64,
 }
 
+/// A quantity that has a name outside of the library, too: others' simulators have a term for it, an identification states it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OutsideTerm {
+    /// Mass of the car.
+    Mass,
+    /// Inertia about the vertical axis.
+    YawInertia,
+    /// Distances of the axles from the centre of gravity.
+    AxleDistances,
+    /// Height of the centre of gravity, m.
+    CogHeight,
+    /// Relaxation length of the tires, m.
+    Relaxation,
+    /// Grip lost by the side's loads being unlike.
+    LateralLoadTransfer,
+    /// Drag of the air.
+    Drag,
+    /// Dead time between command and wheels, s.
+    SteeringDelay,
+    /// Wheel angle over command, less one.
+    SteeringGain,
+    /// Wheel angle at a command of zero, rad.
+    SteeringOffset,
+    /// Time constant (s) and shape of the servo.
+    SteeringLag,
+    /// One over the largest rate of the wheels, s/rad.
+    SteeringRateLimit,
+    /// Where v_y is measured, ahead of the centre of gravity, m.
+    VYLeverArm,
+    /// Added to v_y by its sensor, m/s.
+    VYBias,
+    /// Added to the yaw rate by its sensor, rad/s.
+    YawRateBias,
+}
+
 /// What follows with a lag in the motion for an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Lagging {
@@ -148,6 +183,8 @@ pub struct EffectSpec {
     pub usual: Option<Usual>,
     /// The figure of the car that its first parameter is the error of.
     pub figure: Option<Figure>,
+    /// What it is outside of the library.
+    pub outside: Option<OutsideTerm>,
     /// Whether it is fitted along and never a candidate.
     pub is_nuisance: bool,
     /// Whether it sits in one part of the lap.
@@ -203,6 +240,7 @@ pub(super) const fn spec(
         alike: &[],
         usual: None,
         figure: None,
+        outside: None,
         is_nuisance: false,
         of_a_place: false,
         along: false,

@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectId, EffectSpec, Wheels, positive, spec};
+use super::{Effect, EffectId, EffectSpec, OutsideTerm, Wheels, positive, spec};
 use crate::site::Site;
 use crate::terms::delayed;
 
@@ -12,6 +12,7 @@ pub(super) struct SteeringDelay;
 
 impl Effect for SteeringDelay {
     const SPEC: EffectSpec = EffectSpec {
+        outside: Some(OutsideTerm::SteeringDelay),
         of_a_command: true,
         alike: &[EffectId::SteeringLag, EffectId::TireRelaxation],
         starts: &[0.5, 1.5],

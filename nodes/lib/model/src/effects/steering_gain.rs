@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectSpec, Figure, Wheels, both_sides, spec};
+use super::{Effect, EffectSpec, Figure, OutsideTerm, Wheels, both_sides, spec};
 use crate::site::Site;
 
 /// The wheels turn more than the recording says.
@@ -11,6 +11,7 @@ pub(super) struct SteeringGain;
 
 impl Effect for SteeringGain {
     const SPEC: EffectSpec = EffectSpec {
+        outside: Some(OutsideTerm::SteeringGain),
         figure: Some(Figure { name: "steering_scale", stated: |_| Some(1.0), value: |_, gain| 1.0 + gain }),
         spread: 0.20,
         ..spec(

@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectId, EffectSpec, ParameterSpec, Wheels, positive, spec};
+use super::{Effect, EffectId, EffectSpec, OutsideTerm, ParameterSpec, Wheels, positive, spec};
 use crate::site::Site;
 
 /// The wheels follow the command through a servo: a lag of second order.
@@ -14,6 +14,7 @@ const SHORT_LAG: f64 = 1.0 / 30.0;
 
 impl Effect for SteeringLag {
     const SPEC: EffectSpec = EffectSpec {
+        outside: Some(OutsideTerm::SteeringLag),
         sizing: 1,
         of_a_command: true,
         alike: &[EffectId::SteeringDelay, EffectId::TireRelaxation, EffectId::SteeringBacklash],

@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectSpec, Wheels, both_sides, spec};
+use super::{Effect, EffectSpec, OutsideTerm, Wheels, both_sides, spec};
 use crate::site::Site;
 
 /// The wheels are not straight when the recording says so.
@@ -10,14 +10,17 @@ use crate::site::Site;
 pub(super) struct SteeringOffset;
 
 impl Effect for SteeringOffset {
-    const SPEC: EffectSpec = spec(
-        "steering_offset",
-        "d = u + d0",
-        "steering centre, alignment",
-        "straights, both turn directions",
-        &[Site::Steering],
-        &[both_sides("offset_rad", "rad", [0.01, 0.005])],
-    );
+    const SPEC: EffectSpec = EffectSpec {
+        outside: Some(OutsideTerm::SteeringOffset),
+        ..spec(
+            "steering_offset",
+            "d = u + d0",
+            "steering centre, alignment",
+            "straights, both turn directions",
+            &[Site::Steering],
+            &[both_sides("offset_rad", "rad", [0.01, 0.005])],
+        )
+    };
 
     fn follow<T: Real>(p: &[T], _wheels: &mut Wheels<T>, steering_rad: T, _dt_s: f64) -> T {
         steering_rad + p[0]

@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectSpec, ParameterSpec, Reported, Wheels, spec};
+use super::{Effect, EffectSpec, OutsideTerm, ParameterSpec, Reported, Wheels, spec};
 use crate::site::Site;
 
 /// The limit of an inverse rate: infinite, in files `null`, where there is none.
@@ -16,6 +16,7 @@ pub(super) struct SteeringRateLimit;
 
 impl Effect for SteeringRateLimit {
     const SPEC: EffectSpec = EffectSpec {
+        outside: Some(OutsideTerm::SteeringRateLimit),
         reported: &[Reported { name: "rate_radps", unit: "rad/s", value: |p| rate_radps(p[0]) }],
         starts: &[1.0, 2.0, 3.5],
         flat_at_null: true,

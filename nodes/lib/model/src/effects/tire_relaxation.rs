@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectId, EffectSpec, Lagging, positive, spec};
+use super::{Effect, EffectId, EffectSpec, Lagging, OutsideTerm, positive, spec};
 use crate::site::Site;
 use crate::terms::Car;
 
@@ -12,6 +12,7 @@ pub(super) struct TireRelaxation;
 
 impl Effect for TireRelaxation {
     const SPEC: EffectSpec = EffectSpec {
+        outside: Some(OutsideTerm::Relaxation),
         // A third of the radius of the wheel; where that is not known, of a size that matters.
         usual: Some(|car, size| 0.33 * car.wheel_radius_m.unwrap_or(0.6 * size)),
         lagging: &[Lagging::Slip],

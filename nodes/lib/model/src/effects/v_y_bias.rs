@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectSpec, both_sides, spec};
+use super::{Effect, EffectSpec, OutsideTerm, both_sides, spec};
 use crate::site::Site;
 use crate::terms::Outputs;
 
@@ -11,14 +11,17 @@ use crate::terms::Outputs;
 pub(super) struct VyBias;
 
 impl Effect for VyBias {
-    const SPEC: EffectSpec = spec(
-        "v_y_bias",
-        "v_ym = v_y + b",
-        "a sensor that is not mounted straight, an estimator's bias",
-        "straights",
-        &[Site::Vy],
-        &[both_sides("bias_mps", "m/s", [0.06, 0.1])],
-    );
+    const SPEC: EffectSpec = EffectSpec {
+        outside: Some(OutsideTerm::VYBias),
+        ..spec(
+            "v_y_bias",
+            "v_ym = v_y + b",
+            "a sensor that is not mounted straight, an estimator's bias",
+            "straights",
+            &[Site::Vy],
+            &[both_sides("bias_mps", "m/s", [0.06, 0.1])],
+        )
+    };
 
     fn sense<T: Real>(p: &[T], out: &mut Outputs<T>) {
         for v in &mut out.v_y_mps {

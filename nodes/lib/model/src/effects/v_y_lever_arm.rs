@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectSpec, both_sides, spec};
+use super::{Effect, EffectSpec, OutsideTerm, both_sides, spec};
 use crate::site::Site;
 use crate::terms::Outputs;
 
@@ -12,6 +12,7 @@ pub(super) struct VyLeverArm;
 
 impl Effect for VyLeverArm {
     const SPEC: EffectSpec = EffectSpec {
+        outside: Some(OutsideTerm::VYLeverArm),
         spread: 0.03,
         ..spec(
             "v_y_lever_arm",

@@ -3,7 +3,7 @@
 use gripsight_vehicle::Real;
 
 use super::common::ratio;
-use super::{Effect, EffectSpec, Figure, spec};
+use super::{Effect, EffectSpec, Figure, OutsideTerm, spec};
 use crate::site::Site;
 use crate::terms::Car;
 
@@ -13,6 +13,7 @@ pub(super) struct YawInertiaError;
 
 impl Effect for YawInertiaError {
     const SPEC: EffectSpec = EffectSpec {
+        outside: Some(OutsideTerm::YawInertia),
         figure: Some(Figure {
             name: "yaw_inertia_kgm2",
             stated: |car| Some(car.yaw_inertia_kgm2),

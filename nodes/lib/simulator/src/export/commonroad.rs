@@ -1,11 +1,11 @@
 //! A folder of CommonRoad's vehicle models. They know one tire for both axles: it is the mean of both.
 
-use gripsight_model::EffectId;
+use gripsight_model::OutsideTerm;
 
 use super::Figures;
 
 /// What it has a term for, beside the car's figures.
-pub(super) const EFFECTS: [EffectId; 1] = [EffectId::SteeringRateLimit];
+pub(super) const TERMS: [OutsideTerm; 1] = [OutsideTerm::SteeringRateLimit];
 
 /// A rate that does not limit.
 const RATE_RADPS: f64 = 10.0;

@@ -7,7 +7,7 @@ mod commonroad;
 mod open_car_dynamics;
 mod slipx;
 
-use gripsight_model::{Car, CarFile, EffectId, ModelError};
+use gripsight_model::{Car, CarFile, EffectId, ModelError, OutsideTerm};
 use gripsight_vehicle::PacejkaParameters;
 
 /// Whose files.
@@ -76,30 +76,32 @@ fn figures(file: &CarFile, effects: &[(EffectId, Vec<f64>)]) -> Figures {
     let vehicle = &file.vehicle;
     let mut car = Car::nominal(vehicle, [file.tires.front.d, file.tires.rear.d]);
     effects.iter().for_each(|(effect, own)| effect.car(own, &mut car));
-    let of = |id: EffectId| effects.iter().find(|(e, _)| *e == id).map(|(_, own)| own.as_slice());
+    let of = |term: OutsideTerm| {
+        effects.iter().find(|(e, _)| e.spec().outside == Some(term)).map(|(_, own)| own.as_slice())
+    };
     Figures {
         name: vehicle.name.clone().unwrap_or_else(|| "car".to_owned()),
         mass_kg: car.mass_kg,
         yaw_inertia_kgm2: car.yaw_inertia_kgm2,
         l_f_m: car.l_f_m,
         l_r_m: car.l_r_m,
-        h_cg_m: of(EffectId::LongitudinalLoadTransfer).map_or(vehicle.h_cg_m, |own| own[0]),
+        h_cg_m: of(OutsideTerm::CogHeight).map_or(vehicle.h_cg_m, |own| own[0]),
         wheel_radius_m: vehicle.wheel_radius_m.unwrap_or(RADIUS_SHARE * vehicle.wheelbase_m()),
         max_steering_rad: vehicle.max_steering_rad,
         drive_front_share: vehicle.front_drive_share(),
         brake_front_share: vehicle.front_brake_share(),
         relaxation_m: car.relaxation_m,
         drag_n_s2pm2: car.drag_1pm * vehicle.mass_kg,
-        steering_offset_rad: of(EffectId::SteeringOffset).map_or(0.0, |own| own[0]),
-        lag: of(EffectId::SteeringLag).map(|own| [own[0], own[1]]).filter(|own| own[0] > 0.0),
-        rate_radps: of(EffectId::SteeringRateLimit).filter(|own| own[0] > 0.0).map(|own| 1.0 / own[0]),
+        steering_offset_rad: of(OutsideTerm::SteeringOffset).map_or(0.0, |own| own[0]),
+        lag: of(OutsideTerm::SteeringLag).map(|own| [own[0], own[1]]).filter(|own| own[0] > 0.0),
+        rate_radps: of(OutsideTerm::SteeringRateLimit).filter(|own| own[0] > 0.0).map(|own| 1.0 / own[0]),
         tires: file.tires,
     }
 }
 
 /// What every target takes with the car's figures.
-const FIGURES: [EffectId; 4] =
-    [EffectId::MassError, EffectId::YawInertiaError, EffectId::CogShift, EffectId::LongitudinalLoadTransfer];
+const FIGURES: [OutsideTerm; 4] =
+    [OutsideTerm::Mass, OutsideTerm::YawInertia, OutsideTerm::AxleDistances, OutsideTerm::CogHeight];
 
 /// A car's files for a simulator.
 ///
@@ -108,12 +110,14 @@ const FIGURES: [EffectId; 4] =
 pub fn export(target: Target, car: &CarFile) -> Result<Exported, ExportError> {
     let effects = car.effects()?;
     let figures = figures(car, &effects);
-    let (files, more): (_, &[EffectId]) = match target {
-        Target::Slipx => (slipx::files(&figures)?, &slipx::EFFECTS),
-        Target::Commonroad => (commonroad::files(&figures), &commonroad::EFFECTS),
-        Target::OpenCarDynamics => (open_car_dynamics::files(&figures), &open_car_dynamics::EFFECTS),
+    let (files, more): (_, &[OutsideTerm]) = match target {
+        Target::Slipx => (slipx::files(&figures)?, &slipx::TERMS),
+        Target::Commonroad => (commonroad::files(&figures), &commonroad::TERMS),
+        Target::OpenCarDynamics => (open_car_dynamics::files(&figures), &open_car_dynamics::TERMS),
     };
     let named = effects.iter().map(|(effect, _)| *effect);
-    let left_out = named.filter(|e| !FIGURES.contains(e) && !more.contains(e)).collect();
+    let has =
+        |e: &EffectId| e.spec().outside.is_some_and(|term| FIGURES.contains(&term) || more.contains(&term));
+    let left_out = named.filter(|e| !has(e)).collect();
     Ok(Exported { files, left_out, axles_share_a_tire: target == Target::Commonroad })
 }

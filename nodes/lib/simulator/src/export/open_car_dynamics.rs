@@ -1,13 +1,13 @@
 //! The parameters of an Open-Car-Dynamics vehicle, by the names that its models declare: single track, MF_SIMPLE tires, first-order steering.
 
-use gripsight_model::EffectId;
+use gripsight_model::OutsideTerm;
 use serde_json::{Map, Value};
 
 use super::Figures;
 
 /// What it has a term for, beside the car's figures.
-pub(super) const EFFECTS: [EffectId; 3] =
-    [EffectId::SteeringLag, EffectId::SteeringRateLimit, EffectId::SteeringOffset];
+pub(super) const TERMS: [OutsideTerm; 3] =
+    [OutsideTerm::SteeringLag, OutsideTerm::SteeringRateLimit, OutsideTerm::SteeringOffset];
 
 /// Steering that is there at once, and as fast as it likes.
 const AT_ONCE_S: f64 = 0.001;

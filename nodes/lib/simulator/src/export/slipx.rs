@@ -1,17 +1,17 @@
 //! A car folder of slipx: car, dynamics, limits, sensors, provenance, and a tire for each axle.
 
-use gripsight_model::EffectId;
+use gripsight_model::OutsideTerm;
 use gripsight_vehicle::{GRAVITY_MPS2, MagicFormula};
 
 use super::{ExportError, Figures};
 
 /// What it has a term for, beside the car's figures.
-pub(super) const EFFECTS: [EffectId; 5] = [
-    EffectId::TireRelaxation,
-    EffectId::SteeringLag,
-    EffectId::SteeringRateLimit,
-    EffectId::AeroDrag,
-    EffectId::LateralLoadTransfer,
+pub(super) const TERMS: [OutsideTerm; 5] = [
+    OutsideTerm::Relaxation,
+    OutsideTerm::SteeringLag,
+    OutsideTerm::SteeringRateLimit,
+    OutsideTerm::Drag,
+    OutsideTerm::LateralLoadTransfer,
 ];
 
 /// Largest car.

@@ -1,24 +1,23 @@
 //! `gripsight export`: the car that was found, for others' simulators.
 
-use std::collections::BTreeMap;
+mod car;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use clap::{Args, Subcommand, ValueEnum};
-use gripsight_diagnosis::ExtendedModelFile;
 use gripsight_fmu::{LIBRARY, Version, write};
-use gripsight_identification::{Nuisance, SignalCorrections, Status};
-use gripsight_model::{CarFile, EffectId};
+use gripsight_model::CarFile;
 use gripsight_simulator::{Target, export};
-use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
-use serde::Deserialize;
 
 use crate::Outcome;
+use car::car;
 
 /// Write the car that was found for another simulator.
 ///
-/// RESULT is the folder of an identification (the tires found, with what was taken out of the signals) or of a diagnosis (the extended model).
+/// RESULT is the folder of an identification (the car's own tires of its posterior.json; without one the tires found, with what was taken out of the
+/// signals) or of a diagnosis (the extended model).
 /// What a simulator has no term for is said.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -91,7 +90,7 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Outcome> {
 }
 
 fn unit(args: &FmuArgs) -> anyhow::Result<Outcome> {
-    let car = car(&args.result)?;
+    let (car, own) = car(&args.result)?;
     let library = args.library.clone().map_or_else(library_beside, Ok)?;
     let version = match args.fmi {
         Fmi::Two => Version::Two,
@@ -99,7 +98,7 @@ fn unit(args: &FmuArgs) -> anyhow::Result<Outcome> {
     };
     write(&args.out, version, &car, &library)
         .with_context(|| format!("cannot write {}", args.out.display()))?;
-    said(&car);
+    said(&car, own);
     println!("unit       {}", args.out.display());
     Ok(Outcome::Done)
 }
@@ -119,9 +118,9 @@ fn library_beside() -> anyhow::Result<PathBuf> {
 }
 
 fn files(args: &FilesArgs, target: Target) -> anyhow::Result<Outcome> {
-    let car = car(&args.result)?;
+    let (car, own) = car(&args.result)?;
     let exported = export(target, &car)?;
-    said(&car);
+    said(&car, own);
     for (name, text) in &exported.files {
         let path = if name.is_empty() { args.out.clone() } else { args.out.join(name) };
         if let Some(folder) = path.parent() {
@@ -140,99 +139,14 @@ fn files(args: &FilesArgs, target: Target) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-fn said(car: &CarFile) {
+fn said(car: &CarFile, own: bool) {
     let axle = |t: &gripsight_vehicle::MagicFormula| format!("{:.3} {:.3} {:.3} {:.3}", t.b, t.c, t.d, t.e);
     println!("tires      front {}, rear {} (B C D E)", axle(&car.tires.front), axle(&car.tires.rear));
     let names: Vec<&str> = car.effects.keys().map(String::as_str).collect();
     println!("effects    {}", if names.is_empty() { "none".to_owned() } else { names.join(", ") });
-}
-
-/// The part of gap.json that tells the car.
-#[derive(Deserialize)]
-struct Diagnosed {
-    vehicle: VehicleParameters,
-}
-
-/// The part of identification.json that tells the car.
-#[derive(Deserialize)]
-struct Identified {
-    status: Status,
-    vehicle: VehicleParameters,
-    found: PacejkaParameters,
-    signals: SignalCorrections,
-    nuisance: Nuisance,
-}
-
-/// The car of a result.
-fn car(result: &Path) -> anyhow::Result<CarFile> {
-    let read = |name: &str| {
-        let path = result.join(name);
-        fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))
-    };
-    if result.join("gap.json").is_file() {
-        let not_one = "gap.json does not tell the car: diagnose again";
-        let diagnosed: Diagnosed = serde_json::from_str(&read("gap.json")?).context(not_one)?;
-        let text = read("extended_model.yaml")
-            .context("there is no model in it: the data could not tell, or a simulator was diagnosed")?;
-        let model = ExtendedModelFile::from_yaml(&text)?;
-        let effects = model.usual.into_iter().chain(model.effects).collect();
-        return Ok(CarFile { vehicle: diagnosed.vehicle, tires: model.tires, effects });
-    }
-    if !result.join("identification.json").is_file() {
-        bail!("{} is not the folder of an identification or a diagnosis", result.display());
-    }
-    let identified: Identified = serde_json::from_str(&read("identification.json")?)
-        .context("identification.json is not one of this version")?;
-    if identified.status == Status::Rejected {
-        bail!("that identification was rejected: its tires are not known");
-    }
-    Ok(CarFile {
-        vehicle: identified.vehicle,
-        tires: identified.found,
-        effects: effects_of(&identified.signals, &identified.nuisance),
-    })
-}
-
-/// What was taken out of the signals, and the lag of the tires, as effects.
-fn effects_of(signals: &SignalCorrections, nuisance: &Nuisance) -> BTreeMap<String, BTreeMap<String, f64>> {
-    [
-        (EffectId::SteeringDelay, signals.steering_delay_s.max(0.0)),
-        (EffectId::SteeringGain, signals.steering_gain - 1.0),
-        (EffectId::SteeringOffset, signals.steering_offset_rad),
-        (EffectId::VyLeverArm, signals.v_y_lever_arm_m),
-        (EffectId::VyBias, signals.v_y_bias_mps),
-        (EffectId::GyroBias, signals.yaw_rate_bias_radps),
-        (EffectId::TireRelaxation, nuisance.relaxation_m.max(0.0)),
-    ]
-    .into_iter()
-    .filter(|(_, size)| *size != 0.0)
-    .map(|(effect, size)| {
-        let spec = effect.spec();
-        (spec.name.to_owned(), BTreeMap::from([(spec.parameters[0].name.to_owned(), size)]))
-    })
-    .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_was_taken_out_of_the_signals_is_in_the_car_again() {
-        let signals =
-            SignalCorrections { steering_delay_s: 0.04, steering_gain: 0.9, ..SignalCorrections::NONE };
-        let nuisance = Nuisance { relaxation_m: 0.05, combined_slip: 0.0, load_transfer: 0.0 };
-        let car = CarFile {
-            vehicle: VehicleParameters::f1tenth(),
-            tires: PacejkaParameters::from_array([9.0, 1.5, 1.0, 0.1, 8.0, 1.4, 0.9, -0.2]),
-            effects: effects_of(&signals, &nuisance),
-        };
-        let effects = car.effects().unwrap();
-        assert_eq!(effects.len(), 3);
-        let of = |id: EffectId| effects.iter().find(|(e, _)| *e == id).map(|(_, own)| own[0]).unwrap();
-        let mut steering = [0.1; 20];
-        EffectId::SteeringGain.steer(&[of(EffectId::SteeringGain)], &mut steering, 0.01);
-        assert!((steering[0] - 0.09).abs() < 1e-12);
-        assert_eq!((of(EffectId::SteeringDelay), of(EffectId::TireRelaxation)), (0.04, 0.05));
+    if own {
+        println!(
+            "note       the car's own tires, fitted to the signals as recorded: delay, gain and lever arm are in them"
+        );
     }
 }
