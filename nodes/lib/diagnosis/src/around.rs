@@ -151,20 +151,26 @@ impl Around<'_, '_> {
                 }),
             });
         }
-        let problem = engine.problem(&model, &windows.windows, &parameters, iterations);
-        let from_step = shooting::descend(&problem, Some(starts.to_vec()));
-        let best = if from_step.at.cost.is_finite() {
-            from_step
-        } else {
-            // The step went too far: from where it began.
-            let mut held = parameters.clone();
-            held.iter_mut()
-                .zip(&map)
-                .filter(|(p, _)| p.free)
-                .for_each(|(p, &c)| p.start = values[c].clamp(p.low, p.high));
-            let problem = engine.problem(&model, &windows.windows, &held, iterations);
+        let from = |parameters: &[Parameter]| {
+            let problem = engine.problem(&model, &windows.windows, parameters, iterations);
             shooting::descend(&problem, Some(starts.to_vec()))
         };
+        let mut best = from(&parameters);
+        // A linear step may lead too far: a fit ends no worse than where the linearisation is.
+        let mut here = parameters.clone();
+        here.iter_mut()
+            .zip(&map)
+            .filter(|(p, _)| p.free)
+            .for_each(|(p, &c)| p.start = values[c].clamp(p.low, p.high));
+        let at: Vec<f64> = here.iter().map(|p| p.start).collect();
+        let problem = engine.problem(&model, &windows.windows, &here, 0);
+        let cost = shooting::evaluate(&problem, &at, starts).cost;
+        if !(best.at.cost <= cost) {
+            let again = from(&here);
+            if !(best.at.cost <= again.at.cost) {
+                best = again;
+            }
+        }
         for (&column, &v) in map.iter().zip(&best.parameters) {
             target[column] = v;
         }

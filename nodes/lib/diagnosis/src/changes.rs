@@ -202,9 +202,12 @@ impl Compared {
         (values, (0..self.terms).map(|t| usize::from(has(t))).collect())
     }
 
-    /// Parameters of an effect in the earlier drive.
+    /// Parameters of an effect in the earlier drive: as fitted to it where its model has the effect, else what both drives together make of them.
     pub(crate) fn earlier(&self, earlier: &Inferred, effect: EffectId) -> Option<Vec<f64>> {
         let range = earlier.columns.of_effect(effect)?;
+        if earlier.chosen[earlier.term_of(effect)?] > 0 {
+            return Some(earlier.values[range].to_vec());
+        }
         Some(range.map(|c| earlier.values[c] + self.selection.best_step[c]).collect())
     }
 

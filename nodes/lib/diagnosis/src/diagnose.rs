@@ -98,10 +98,9 @@ pub fn diagnose(request: &Request<'_>, progress: &mut dyn FnMut(&str)) -> Result
             let (Some(together), Some(recording)) = (&request.together, recording) else {
                 return Ok(diagnosis);
             };
-            let mut all = Earlier::of(diagnosis, inferred, recording);
+            let all = Earlier::of(diagnosis, inferred, recording);
             let contradicts = drives::contradictions(&all, together, request, progress)?;
-            all.diagnosis.drives.iter_mut().zip(contradicts).for_each(|(d, c)| d.contradicts = c);
-            Ok(all.diagnosis)
+            drives::of_one_state(all.diagnosis, contradicts, together, request, progress)
         }
         Err(error) if cannot_tell(&error) => Ok(refused(request, &error, data_health)),
         Err(error) => Err(error),

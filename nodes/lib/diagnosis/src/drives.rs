@@ -2,13 +2,15 @@
 
 use gripsight_estimation::{Estimate, Windows, by_block, interval};
 use gripsight_model::Recording;
-use gripsight_signals::{DataHealth, StateSequence};
+use gripsight_signals::{DataHealth, Joined, StateSequence};
 use serde::Serialize;
 
 use crate::answer::Change;
 use crate::budget::Scorer;
+use crate::diagnose::explain;
+use crate::outcome::Diagnosis;
 use crate::state::State;
-use crate::usable::usable;
+use crate::usable::{Usable, usable};
 use crate::{Earlier, GapError, Request};
 
 /// The drives that a [`Request`]'s sequence joins.
@@ -27,11 +29,12 @@ pub struct DriveAnswer {
     pub name: String,
     /// Its length, s.
     pub duration_s: f64,
-    /// Mean squared error over the noise variance on its scored stretches, with tires fitted to all drives.
+    /// Mean squared error over the noise variance on its scored stretches, with tires fitted to all drives that are explained together; unknown (`null`)
+    /// of one that is not.
     pub retuned: Estimate,
     /// The same with what the diagnosis of all of them names.
     pub after: Estimate,
-    /// What differs in it from what all of them give together: a car in one state has nothing here. Unknown (`null`) of a drive that cannot be compared:
+    /// What differs in it from the others: a car in one state has nothing here. Unknown (`null`) of a drive that cannot be compared:
     /// it is too short by itself, or records other signals.
     pub contradicts: Option<Vec<Change>>,
 }
@@ -75,24 +78,103 @@ fn within(recording: &Recording, windows: &Windows, [from_s, to_s]: [f64; 2]) ->
     windows.picked(&places)
 }
 
-/// What differs in each drive from what all of them give. A drive is part of all of them, so that its difference is known somewhat better than is
-/// stated.
+/// What differs in each drive from the others; `None` of a drive that cannot be compared.
+type Differing = Vec<Option<Vec<Change>>>;
+
+/// What differs in each drive from what all of them give or, where drives do differ, from the drive that most of them agree with: what drives in unlike
+/// states give together is the state of none.
 pub(crate) fn contradictions(
     all: &Earlier,
     together: &Together<'_>,
     request: &Request<'_>,
     progress: &mut dyn FnMut(&str),
-) -> Result<Vec<Option<Vec<Change>>>, GapError> {
+) -> Result<Differing, GapError> {
+    let mut drives = Vec::new();
+    for drive in together.alone {
+        let health = DataHealth::of(drive)?;
+        drives.push(usable(&Request::new(drive, request.vehicle), &health).ok());
+    }
+    let mut most = held_against(all, &drives, request, progress, "all of them")?;
+    let agreeing = |of: &Differing| of.iter().flatten().filter(|c| c.is_empty()).count();
+    if agreeing(&most) == most.iter().flatten().count() {
+        return Ok(most);
+    }
+    let mut count = 0;
+    for (number, drive) in together.alone.iter().enumerate().filter(|(i, _)| drives[*i].is_some()) {
+        let alone = Request { sequence: drive, held_out: None, together: None, ..request.clone() };
+        let Ok(reference) = Earlier::diagnosed(&alone, progress) else { continue };
+        let mut found =
+            held_against(&reference, &drives, request, progress, &format!("drive {}", number + 1))?;
+        found[number] = Some(Vec::new());
+        if agreeing(&found) > count {
+            count = agreeing(&found);
+            most = found;
+        }
+        if 2 * count > most.iter().flatten().count() {
+            break;
+        }
+    }
+    Ok(most)
+}
+
+/// The diagnosis of all drives where they agree, else of those that do.
+pub(crate) fn of_one_state(
+    mut all: Diagnosis,
+    differing: Differing,
+    together: &Together<'_>,
+    request: &Request<'_>,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Diagnosis, GapError> {
+    let one_state: Vec<usize> = (differing.iter().enumerate())
+        .filter(|(_, c)| c.as_ref().is_some_and(Vec::is_empty))
+        .map(|(i, _)| i)
+        .collect();
+    let agree = differing.iter().flatten().all(Vec::is_empty);
+    all.drives.iter_mut().zip(differing).for_each(|(d, c)| d.contradicts = c);
+    if agree || one_state.is_empty() {
+        return Ok(all);
+    }
+    let alone: Vec<StateSequence> = one_state.iter().map(|&i| together.alone[i].clone()).collect();
+    let joined = Joined::of(&alone)?;
+    let part = Request {
+        sequence: &joined.sequence,
+        together: Some(Together { alone: &alone, spans_s: &joined.spans_s }),
+        ..request.clone()
+    };
+    progress("explaining the drives that agree");
+    let health = DataHealth::of(part.sequence)?;
+    let (mut diagnosis, _) = explain(&part, usable(&part, &health)?, health, progress)?;
+    let explained = std::mem::take(&mut diagnosis.drives);
+    for drive in &mut all.drives {
+        (drive.retuned, drive.after) = (Estimate::UNKNOWN, Estimate::UNKNOWN);
+    }
+    for (&i, own) in one_state.iter().zip(explained) {
+        (all.drives[i].retuned, all.drives[i].after) = (own.retuned, own.after);
+    }
+    let apart = "the drives are not in one state: only those that agree with each other are explained";
+    diagnosis.reasons.insert(0, apart.to_owned());
+    diagnosis.drives = all.drives;
+    Ok(diagnosis)
+}
+
+/// What differs in each drive from a reference, which it may be part of: its difference then is known somewhat better than is stated.
+fn held_against(
+    reference: &Earlier,
+    drives: &[Option<Usable>],
+    request: &Request<'_>,
+    progress: &mut dyn FnMut(&str),
+    name: &str,
+) -> Result<Differing, GapError> {
     let mut out = Vec::new();
-    for (number, drive) in together.alone.iter().enumerate() {
-        progress(&format!("holding drive {} against all of them", number + 1));
-        let own = usable(&Request::new(drive, request.vehicle), &DataHealth::of(drive)?).ok();
+    for (number, drive) in drives.iter().enumerate() {
         // What only some drives record was left out of all of them.
-        let Some(own) = own.filter(|own| all.matches(&own.recording)) else {
+        let Some(own) = drive.as_ref().filter(|own| reference.matches(&own.recording)) else {
             out.push(None);
             continue;
         };
-        let (_, differences) = all.with_later(&own.recording, request.vehicle, &own.windows.training)?;
+        progress(&format!("holding drive {} against {name}", number + 1));
+        let (_, differences) =
+            reference.with_later(&own.recording, request.vehicle, &own.windows.training)?;
         out.push(Some(differences.likely()));
     }
     Ok(out)

@@ -209,8 +209,14 @@ fn drives_in_one_state_are_explained_together_and_one_in_another_contradicts() {
     let compared: Vec<bool> = beside.drives.iter().map(|d| d.contradicts.is_some()).collect();
     assert_eq!(compared, [true, false], "{}", text(&beside));
     let mixed = explained(&alone);
-    let odd = mixed.drives[2].contradicts.as_ref().unwrap();
-    assert!(odd.iter().any(|c| c.site == "steering" && c.probability > 0.9), "{}", text(&mixed));
+    // What they give together is the state of none: the two that agree are explained, and the third is told by what differs in it.
+    assert_eq!(named(&mixed), ["steering_lag"], "{}", text(&mixed));
+    assert_eq!(differs(&mixed)[..2], nothing, "{}", text(&mixed));
+    let odd = &mixed.drives[2].contradicts.as_ref().unwrap()[0];
+    assert!(odd.name == "steering_lag" && odd.probability > 0.9, "{}", text(&mixed));
+    assert!((-0.09..-0.07).contains(&odd.difference.value), "{}", text(&mixed));
+    assert!(mixed.drives[2].after.value.is_nan() && mixed.drives[1].after.value.is_finite());
+    assert!(mixed.reasons[0].contains("not in one state"), "{}", mixed.reasons[0]);
 }
 
 #[test]

@@ -131,7 +131,7 @@ pub fn select(
         mean: DVector::zeros(0),
     };
     let mut evidence = sampler.refresh()?;
-    let mut best = (evidence, sampler.chosen.clone(), sampler.mean.clone());
+    let mut best = (evidence + sampler.log_within_bounds(), sampler.chosen.clone(), sampler.mean.clone());
     let count = |t: &Term| t.log_weights.len();
     let mut sums: Vec<Vec<(f64, Vec<[f64; 2]>)>> =
         terms.iter().map(|t| vec![(0.0, vec![[0.0; 2]; t.priors.len()]); count(t)]).collect();
@@ -190,8 +190,9 @@ pub fn select(
         if sweep < RUN_IN {
             evidence += sampler.simplified(&open);
         }
-        if evidence > best.0 {
-            best = (evidence, sampler.chosen.clone(), sampler.mean.clone());
+        let possible = evidence + sampler.log_within_bounds();
+        if possible > best.0 {
+            best = (possible, sampler.chosen.clone(), sampler.mean.clone());
         }
         if sweep >= RUN_IN {
             visited.push(sampler.chosen.iter().map(|&a| a as u8).collect());
@@ -294,6 +295,21 @@ impl Sampler<'_> {
         self.terms.iter().zip(&self.chosen).map(|(t, &a)| t.log_weights[a]).sum()
     }
 
+    /// Logarithm of how much more of the posterior than of the priors lies within the bounds: a configuration that explains the data best with an
+    /// impossible value is not the most probable one.
+    fn log_within_bounds(&self) -> f64 {
+        self.terms
+            .iter()
+            .zip(&self.chosen)
+            .filter(|(t, _)| t.log_weights.len() > 1)
+            .map(|(term, &alternative)| {
+                let moments: Vec<[f64; 2]> =
+                    term.columns().map(|c| [self.mean[c], self.covariance[(c, c)].max(0.0)]).collect();
+                within_bounds(term, alternative, &moments)
+            })
+            .sum()
+    }
+
     /// Moments of a term's columns under each of its alternatives, the alternatives' weights, and their sum; `None` where rounding has made them no
     /// weights.
     #[expect(clippy::type_complexity, reason = "used in one place, and taken apart at once")]
@@ -380,7 +396,6 @@ impl Sampler<'_> {
         weights + priors - 0.5 * determinant.ln() - 0.5 * cost
     }
 
-    /// Mean and variance of a term's columns were one of its alternatives chosen.
     /// Takes out pairs of terms that do nothing but cancel each other: neither goes alone, and a chain seldom tries both at once. How much the
     /// logarithm of the evidence gains.
     fn simplified(&mut self, open: &[usize]) -> f64 {
@@ -396,6 +411,7 @@ impl Sampler<'_> {
         }
     }
 
+    /// Mean and variance of a term's columns were one of its alternatives chosen.
     fn moments(&self, i: usize, to: usize) -> Vec<[f64; 2]> {
         let term = &self.terms[i];
         let k = term.priors.len();

@@ -14,13 +14,17 @@ use crate::text::fixed;
 pub(super) fn lines(out: &mut String, d: &Diagnosis) {
     let mut head = "drives";
     for drive in &d.drives {
+        let errors = if drive.retuned.value.is_finite() {
+            let (retuned, after) = (figure(&drive.retuned), figure(&drive.after));
+            format!("{retuned} times the noise with other tires, {after} with what is named")
+        } else {
+            "not explained".to_owned()
+        };
         let _ = writeln!(
             out,
-            "{head:<10} {}, {} s: {} times the noise with other tires, {} with what is named; {}",
+            "{head:<10} {}, {} s: {errors}; {}",
             drive.name,
             fixed(drive.duration_s, 0),
-            known(&drive.retuned),
-            known(&drive.after),
             contradicts(drive)
         );
         head = "";
@@ -31,7 +35,7 @@ pub(super) fn lines(out: &mut String, d: &Diagnosis) {
 pub(super) fn table(d: &Diagnosis) -> Markup {
     html! {
         table {
-            thead { tr { th { "Drive" } th { "Length" } th { "Error with other tires" } th { "With what is named" } th { "Beside all of them" } } }
+            thead { tr { th { "Drive" } th { "Length" } th { "Error with other tires" } th { "With what is named" } th { "Beside the others" } } }
             tbody {
                 @for drive in &d.drives {
                     tr class=[drive.contradicts.as_ref().is_some_and(|c| !c.is_empty()).then_some("named")] {
