@@ -165,9 +165,9 @@ impl Around<'_, '_> {
         let at: Vec<f64> = here.iter().map(|p| p.start).collect();
         let problem = engine.problem(&model, &windows.windows, &here, 0);
         let cost = shooting::evaluate(&problem, &at, starts).cost;
-        if !(best.at.cost <= cost) {
+        if best.at.cost.total_cmp(&cost).is_gt() {
             let again = from(&here);
-            if !(best.at.cost <= again.at.cost) {
+            if best.at.cost.total_cmp(&again.at.cost).is_gt() {
                 best = again;
             }
         }

@@ -223,8 +223,6 @@ pub(crate) struct Trial {
     pub(crate) cost: f64,
     /// Half its derivative by each column.
     pub(crate) gradient: DVector<f64>,
-    /// Both, block by block.
-    pub(crate) blocks: Vec<(f64, DVector<f64>)>,
     /// How far the best start states are from those given.
     pub(crate) shifts: Vec<[f64; 2]>,
 }
@@ -258,15 +256,10 @@ impl Joint {
                 part.looked_at(residual, scale)
             })
             .collect();
-        let zero = (0.0, DVector::zeros(self.columns));
         let shifts = parts.iter().map(|p| p.2).collect();
-        let blocks: Vec<(f64, DVector<f64>)> = self
-            .blocks()
-            .iter()
-            .map(|members| members.iter().fold(zero.clone(), |(c, g), &k| (c + parts[k].0, g + &parts[k].1)))
-            .collect();
-        let (cost, gradient) = blocks.iter().fold(zero, |(c, g), b| (c + b.0, g + &b.1));
-        let out = Trial { cost, gradient, blocks, shifts };
+        let zero = (0.0, DVector::zeros(self.columns));
+        let (cost, gradient) = parts.iter().fold(zero, |(c, g), p| (c + p.0, g + &p.1));
+        let out = Trial { cost, gradient, shifts };
         (out.cost.is_finite() && out.gradient.iter().all(|g| g.is_finite())).then_some(out)
     }
 }

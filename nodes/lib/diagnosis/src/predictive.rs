@@ -3,93 +3,135 @@
 //! Leaving a block out needs no fit. At the best fit to all blocks the gradients and the priors' pull cancel, so that without block k the best is
 //!
 //! ```text
-//! delta_k = (A - H_k/phi)^-1 g_k/phi,      cost_k(theta + delta_k) = cost_k + 2 g_k' delta_k + delta_k' H_k delta_k
+//! delta_k = (A - H_k/phi)^-1 g_k/phi
 //! ```
 //!
-//! away (one Newton step, as in approximate leave-one-out cross-validation: Beirami et al. 2017). g_k, H_k: half gradient and information of the
-//! block, A: information over the dispersion phi, with the priors. What only one block asks for gets no credit, however well it fits there.
+//! away (one Newton step, as in approximate leave-one-out cross-validation: Beirami et al. 2017), and the block is run there, with start states of its
+//! own. g_k, H_k: half gradient and information of the block, both at the fit; A: information over the dispersion phi, with the priors. What only one
+//! block asks for gets no credit, however well it fits there.
 
-use gripsight_estimation::selection::Term;
+use gripsight_estimation::selection::{ColumnPrior, Term};
 use gripsight_estimation::shooting::{self, Parameter};
 use nalgebra::{DMatrix, DVector};
 
 use crate::around::{Around, Refined};
 use crate::budget::Scorer;
-use crate::joint::Weighed;
 
-/// Iterations of the fit of start states.
+/// Iterations of the fit of start states, and where the model is but a step from a fitted one.
 const START_ITERATIONS: usize = 6;
+const START_ITERATIONS_NEARBY: usize = 2;
+
+/// A column of a configuration's model.
+struct Own {
+    value: f64,
+    bounds: [f64; 2],
+    /// Precision of its prior, where it can move.
+    precision: Option<f64>,
+}
+
+impl Own {
+    fn fixed(value: f64) -> Parameter {
+        Parameter { start: value, low: value, high: value, free: false, prior: None }
+    }
+}
 
 impl Around<'_, '_> {
-    /// Robust sum of squares of a configuration fitted to `weighed`, all channels, under the noise of the inference: of the blocks held out, and of all
+    /// Robust sum of squares of a fitted configuration, all channels, under the noise of the inference: of the blocks held out, and of all
     /// others, each left out once. Not a number where it cannot be told.
     pub(crate) fn predictive_cost(
         &self,
-        weighed: &Weighed,
         terms: &[Term],
         scorer: &Scorer<'_>,
         chosen: &[usize],
         fitted: &Refined,
     ) -> f64 {
         let apart = if scorer.is_apart() { self.cost_apart(scorer, chosen, &fitted.values) } else { 0.0 };
-        apart + self.cost_left_out(weighed, terms, chosen, fitted).unwrap_or(f64::NAN)
+        apart + self.cost_left_out(terms, chosen, fitted).unwrap_or(f64::NAN)
     }
 
     /// The same on the data held out alone.
     fn cost_apart(&self, scorer: &Scorer<'_>, chosen: &[usize], values: &[f64]) -> f64 {
         let (model, own, _) = self.model(&scorer.engine, chosen, values);
-        let fixed = |&start: &f64| Parameter { start, low: start, high: start, free: false, prior: None };
-        let parameters: Vec<Parameter> = own.iter().map(fixed).collect();
+        let parameters: Vec<Parameter> = own.iter().map(|&v| Own::fixed(v)).collect();
         let problem = self.engine.problem(&model, &scorer.windows.windows, &parameters, START_ITERATIONS);
         shooting::descend(&problem, None).at.cost
     }
 
-    /// The same of the blocks fitted, each left out once.
-    fn cost_left_out(
-        &self,
-        weighed: &Weighed,
-        terms: &[Term],
-        chosen: &[usize],
-        fitted: &Refined,
-    ) -> Option<f64> {
-        let (model, own, _) = self.model(self.engine, chosen, &fitted.values);
-        let trial = self.joint.trial(self.engine, &model, &own, &fitted.starts, self.windows, self.scale)?;
+    /// The columns of a configuration's model, in the model's order. What has come to its bound stays there.
+    fn own(&self, terms: &[Term], chosen: &[usize], map: &[usize], values: &[f64]) -> Vec<Own> {
         let in_use = self.in_use(chosen);
-        let (mut columns, mut priors) = (Vec::new(), Vec::new());
-        for (term, &alternative) in terms.iter().zip(chosen) {
-            for (k, prior) in term.priors.iter().enumerate().filter(|(k, _)| in_use[term.from + k]) {
-                columns.push(term.from + k);
-                priors.push(prior.sigma[alternative].powi(-2));
-            }
-        }
-        let n = columns.len();
-        let part = |h: &DMatrix<f64>| DMatrix::from_fn(n, n, |r, c| h[(columns[r], columns[c])]);
-        let blocks = weighed.blocks.iter().zip(&trial.blocks).map(|(block, (cost, gradient))| Block {
-            cost: *cost,
-            gradient: DVector::from_fn(n, |r, _| gradient[columns[r]]),
-            information: part(&block.information),
-        });
-        let prior = DMatrix::from_diagonal(&DVector::from_vec(priors));
-        left_out(&blocks.collect::<Vec<_>>(), &prior, self.dispersion)
+        let prior = |column: usize| -> Option<(&ColumnPrior, usize)> {
+            let place = |t: &Term| (t.from..t.from + t.priors.len()).contains(&column);
+            let found = terms.iter().zip(chosen).find(|(t, _)| place(t));
+            found.map(|(t, &alternative)| (&t.priors[column - t.from], alternative))
+        };
+        map.iter()
+            .zip(values)
+            .map(|(&column, &value)| {
+                let Some((prior, alternative)) = prior(column).filter(|_| in_use[column]) else {
+                    return Own { value, bounds: [value; 2], precision: None };
+                };
+                let bounds = prior.bounds.map(|b| self.values[column] + b);
+                let within = bounds[0] < value && value < bounds[1];
+                Own { value, bounds, precision: within.then(|| prior.sigma[alternative].powi(-2)) }
+            })
+            .collect()
+    }
+
+    /// The same of the blocks fitted, each left out once.
+    fn cost_left_out(&self, terms: &[Term], chosen: &[usize], fitted: &Refined) -> Option<f64> {
+        let (model, values, map) = self.model(self.engine, chosen, &fitted.values);
+        let own = self.own(terms, chosen, &map, &values);
+        let movable = |o: &Own| Parameter { free: o.precision.is_some(), ..Own::fixed(o.value) };
+        let parameters: Vec<Parameter> = own.iter().map(movable).collect();
+        let problem = self.engine.problem(&model, &self.windows.windows, &parameters, 0);
+        let at = shooting::linearize(&problem, &values, &fitted.starts);
+        let precisions: Vec<f64> = own.iter().filter_map(|o| o.precision).collect();
+        let prior = DMatrix::from_diagonal(&DVector::from_vec(precisions));
+        let blocks: Vec<Block> = self
+            .windows
+            .block
+            .chunk_by(|a, b| a == b)
+            .scan(0, |from, members| {
+                let windows = *from..*from + members.len();
+                *from = windows.end;
+                let sum = |of: &[DMatrix<f64>]| of[windows.clone()].iter().sum::<DMatrix<f64>>();
+                let gradient = at.window_gradients[windows.clone()].iter().sum();
+                Some(Block { information: sum(&at.window_information), gradient, windows })
+            })
+            .collect();
+        let whole = blocks.iter().fold(prior, |sum, b| sum + &b.information / self.dispersion);
+        let without = |block: &Block| {
+            let step = block.step(&whole, self.dispersion)?;
+            let mut steps = step.iter();
+            let moved = |o: &Own| {
+                let by = o.precision.and_then(|_| steps.next()).unwrap_or(&0.0);
+                Own::fixed((o.value + by).clamp(o.bounds[0], o.bounds[1]))
+            };
+            let parameters: Vec<Parameter> = own.iter().map(moved).collect();
+            let windows = &self.windows.windows[block.windows.clone()];
+            let starts = fitted.starts[block.windows.clone()].to_vec();
+            let problem = self.engine.problem(&model, windows, &parameters, START_ITERATIONS_NEARBY);
+            Some(shooting::descend(&problem, Some(starts)).at.cost)
+        };
+        blocks.iter().map(without).sum()
     }
 }
 
 /// A block at the best fit to all.
 struct Block {
-    cost: f64,
+    windows: std::ops::Range<usize>,
     /// Half the derivative of the cost.
     gradient: DVector<f64>,
     information: DMatrix<f64>,
 }
 
-/// Costs of all blocks, each left out once; `None` where the others do not tell every parameter.
-fn left_out(blocks: &[Block], prior: &DMatrix<f64>, dispersion: f64) -> Option<f64> {
-    let whole = blocks.iter().fold(prior.clone(), |sum, b| sum + &b.information / dispersion);
-    let without = |b: &Block| {
-        let step = (&whole - &b.information / dispersion).cholesky()?.solve(&b.gradient) / dispersion;
-        Some(b.cost + 2.0 * b.gradient.dot(&step) + step.dot(&(&b.information * &step)))
-    };
-    blocks.iter().map(without).sum()
+impl Block {
+    /// How far the best fit without it is from that to all; `None` where the others do not tell every parameter.
+    fn step(&self, whole: &DMatrix<f64>, dispersion: f64) -> Option<DVector<f64>> {
+        let rest = whole - &self.information / dispersion;
+        Some(rest.cholesky()?.solve(&self.gradient) / dispersion)
+    }
 }
 
 #[cfg(test)]
@@ -120,28 +162,25 @@ mod tests {
     }
 
     #[test]
-    fn of_a_linear_model_it_is_what_fits_without_each_block_leave() {
+    fn of_a_linear_model_a_step_leads_to_the_fit_without_a_block() {
         let data = data();
         let rows = |skip: usize| -> Vec<([f64; 2], f64)> {
             let kept = data.iter().enumerate().filter(|(k, _)| *k != skip);
             kept.flat_map(|(_, (x, y))| x.iter().copied().zip(y.iter().copied())).collect()
         };
-        let square = |at: &DVector<f64>, k: usize| -> f64 {
-            let (x, y) = &data[k];
-            x.iter().zip(y).map(|(x, y)| (y - x[0] * at[0] - x[1] * at[1]).powi(2)).sum()
-        };
-        let expected: f64 = (0..3).map(|k| square(&fitted(&rows(k)), k)).sum();
         let at = fitted(&rows(3));
         let block = |k: usize| {
             let (x, y) = &data[k];
             let x = DMatrix::from_fn(x.len(), 2, |r, c| x[r][c]);
             let left = DVector::from_row_slice(y) - &x * &at;
-            Block { cost: left.norm_squared(), gradient: -x.tr_mul(&left), information: x.tr_mul(&x) }
+            Block { windows: k..k + 1, gradient: -x.tr_mul(&left), information: x.tr_mul(&x) }
         };
         let blocks: Vec<Block> = (0..3).map(block).collect();
-        let found = left_out(&blocks, &(DMatrix::identity(2, 2) * PRIOR), DISPERSION).unwrap();
-        approx::assert_relative_eq!(found, expected, epsilon = 1e-9);
-        // More than what the fit to all leaves.
-        assert!(found > blocks.iter().map(|b| b.cost).sum::<f64>());
+        let prior = DMatrix::identity(2, 2) * PRIOR;
+        let whole = blocks.iter().fold(prior, |sum, b| sum + &b.information / DISPERSION);
+        for (k, block) in blocks.iter().enumerate() {
+            let without = &at + block.step(&whole, DISPERSION).unwrap();
+            approx::assert_relative_eq!(without, fitted(&rows(k)), epsilon = 1e-9);
+        }
     }
 }

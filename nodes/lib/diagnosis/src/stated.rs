@@ -69,8 +69,8 @@ impl Around<'_, '_> {
         scorer: &Scorer<'_>,
     ) -> Option<Stated> {
         let asked = Asked { around: self, weighed, scorer, worst: f64::INFINITY };
-        let worst = asked.fitted(vec![0; start.len()])?.cost;
-        let asked = Asked { worst, ..asked };
+        let nothing = asked.fitted(vec![0; start.len()])?;
+        let asked = Asked { worst: nothing.cost, ..asked };
         let mut now = asked.fitted(start)?;
         // The best of effects alone, where it does as well: free terms may do, roughly, what an effect does.
         if let Some(alone) = alone.filter(|a| *a != now.chosen) {
@@ -79,11 +79,17 @@ impl Around<'_, '_> {
                 now = alone;
             }
         }
-        now = asked.without_needless_free_terms(now);
-        now = asked.with_likely_effects(now)?;
-        // What stood in for the effects is no longer needed beside them.
-        now = asked.without_needless_free_terms(now);
-        let (now, simpler) = asked.without_unlikely_effects(now);
+        let weeded = |start: Tried| {
+            let now = asked.with_likely_effects(asked.without_needless_free_terms(start))?;
+            // What stood in for the effects is no longer needed beside them.
+            Some(asked.without_unlikely_effects(asked.without_needless_free_terms(now)))
+        };
+        let least = nothing.cost;
+        let (mut now, mut simpler) = weeded(now)?;
+        // Each part may be needed beside the others, and all of them lead nowhere.
+        if least < now.cost {
+            (now, simpler) = weeded(nothing)?;
+        }
         let (now, simpler) = asked.with_the_likeliest_of_alike(now, simpler);
         let discrepancy = Discrepancy::of(self, &weighed.total, &now.chosen, &now.fitted.values)?;
         let statements = simpler
@@ -139,7 +145,7 @@ impl Asked<'_, '_, '_, '_> {
     ) -> Option<Tried> {
         let terms = self.around.lacking(&chosen);
         let (_, fitted) = fit(&Around { terms: &terms, ..*self.around }, &chosen)?;
-        let cost = self.around.predictive_cost(self.weighed, &terms, self.scorer, &chosen, &fitted);
+        let cost = self.around.predictive_cost(&terms, self.scorer, &chosen, &fitted);
         Some(Tried { chosen, fitted, cost })
     }
 

@@ -18,6 +18,8 @@ pub struct Linearization {
     pub gradient: DVector<f64>,
     /// The share of every window in the gradient: what cluster-robust intervals and scores are made of.
     pub window_gradients: Vec<DVector<f64>>,
+    /// The share of every window in the information matrix.
+    pub window_information: Vec<DMatrix<f64>>,
     /// The share of every window in the cost.
     pub window_costs: Vec<f64>,
     /// Residuals that count.
@@ -85,6 +87,7 @@ pub fn linearize<M: Rollout>(
         information: DMatrix::zeros(p, p),
         gradient: DVector::zeros(p),
         window_gradients: Vec::with_capacity(parts.len()),
+        window_information: Vec::with_capacity(parts.len()),
         window_costs: Vec::with_capacity(parts.len()),
         residuals: 0,
         eliminations: Vec::with_capacity(parts.len()),
@@ -95,6 +98,7 @@ pub fn linearize<M: Rollout>(
         sum.information += &part.information;
         sum.gradient += &part.gradient;
         sum.window_gradients.push(part.gradient);
+        sum.window_information.push(part.information);
         sum.window_costs.push(part.cost);
         sum.eliminations.push(part.elimination);
     }
