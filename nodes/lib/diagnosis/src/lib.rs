@@ -17,8 +17,8 @@
 //! 6. Two drives are compared by differences ([`Earlier`], `changes`): every parameter is in both, and only what one has and the other has not
 //!    is a change, whatever either leaves unexplained.
 //!
-//! 7. Several drives of one car in one state ([`Together`]) are explained as one, and each is then compared with all of them as in 6: what differs there
-//!    contradicts the others.
+//! 7. Several drives of one car in one state ([`Together`]) are explained as one, and each is then compared with all of them as in 6. Where one contradicts,
+//!    each is compared with the drive that most of them agree with, and only those that agree are explained.
 //!
 //! Every number that the answer rests on stands in `decisions`.
 

@@ -306,12 +306,14 @@ fn of_several_drives_each_says_whether_it_agrees() {
     d.drives = vec![
         drive("a.mcap", Some(Vec::new())),
         drive("b.mcap", Some(std::mem::take(&mut d.changes))),
-        drive("c.mcap", None),
+        DriveAnswer { retuned: Estimate::UNKNOWN, after: Estimate::UNKNOWN, ..drive("c.mcap", None) },
     ];
     let text = gap_text(&d, None, &[]);
     let line = |name: &str| text.lines().find(|l| l.contains(name)).unwrap();
     assert!(line("a.mcap").starts_with("drives ") && line("a.mcap").ends_with("agrees with the others"));
-    assert!(line("c.mcap").contains("not compared with the others"), "{text}");
+    let apart = line("c.mcap, 31 s: not explained; ");
+    assert!(apart.contains("not compared with the others"), "{text}");
+    assert!(line("a.mcap").contains("8.0 (6.5 … 9.5) times the noise"), "{text}");
     let said =
         "contradicts the others: something with the steering chain that the library lacks differs: 97 %";
     assert!(line("b.mcap, 31 s").ends_with(said), "{text}");
