@@ -150,7 +150,7 @@ start s4_residual "${motion[@]}" -r sequence:=telemetry/sequence -r candidate:=i
 start identifier "${motion[@]}" -r sequence:=telemetry/sequence -r model:=s4_residual/model -r friction:=camera_prior/friction "${replay[@]}"
 if $camera; then
     defaults=(--params-file "$root/params/camera_prior.yaml")
-    start camera_prior "${eyes[@]}" -r posterior:=identifier/posterior "${replay[@]}"
+    start camera_prior "${eyes[@]}" -r pacejka:=identifier/pacejka "${replay[@]}"
     defaults=()
 elif [[ -n $prior ]]; then
     start camera_prior -p input:=none -p "configured_mu:=$prior" "${replay[@]}"
