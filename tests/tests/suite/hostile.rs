@@ -5,6 +5,7 @@ use std::net::UdpSocket;
 use std::time::{Duration, Instant};
 
 use gripsight_msgs::PacejkaParams;
+use gripsight_mutants::Mutants;
 use gripsight_tests::domain::Domain;
 use gripsight_tests::peers::{PATIENCE, available, cyclone, message, start_cyclone};
 use gripsight_tests::samples;
@@ -22,22 +23,6 @@ const READERS: [[u8; 4]; 4] = [[0, 1, 0, 0xc7], [0, 0, 3, 0xc7], [0, 0, 4, 0xc7]
 /// Submessages that make a reader remember: DATA, DATA_FRAG, HEARTBEAT, GAP, HEARTBEAT_FRAG.
 const KINDS: [u8; 5] = [0x15, 0x16, 0x07, 0x08, 0x13];
 
-/// A sequence of numbers that is the same in every run (xorshift).
-struct Numbers(u64);
-
-impl Numbers {
-    fn below(&mut self, end: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 11) as usize % end
-    }
-
-    fn byte(&mut self) -> u8 {
-        self.below(256) as u8
-    }
-}
-
 /// What a participant with this index in the domain receives: (discovery, data) (RTPS 2.5, 9.6.2.3).
 fn ports(domain: &Domain, index: u16) -> [u16; 2] {
     let [(_, id), ..] = domain.environment();
@@ -46,7 +31,7 @@ fn ports(domain: &Domain, index: u16) -> [u16; 2] {
 }
 
 /// Changes bytes behind the header, adds submessages of any length, or makes the sender somebody new.
-fn mutated(seed: &[u8], numbers: &mut Numbers) -> Vec<u8> {
+fn mutated(seed: &[u8], numbers: &mut Mutants) -> Vec<u8> {
     let mut datagram = seed.to_vec();
     if numbers.below(2) == 0 {
         datagram[8..20].iter_mut().for_each(|byte| *byte = numbers.byte());
@@ -98,7 +83,7 @@ fn mutated_datagrams_cost_a_stated_amount_of_memory_and_the_node_goes_on() {
     assert_eq!(message::<PacejkaParams>(&peer), samples::pacejka(11));
     drop(peer);
 
-    let mut numbers = Numbers(0x9e37_79b9_7f4a_7c15);
+    let mut numbers = Mutants::new(0x9e37_79b9_7f4a_7c15);
     let (start, mut most_mb) = (Instant::now(), 0.0_f64);
     for index in 0..COUNT {
         let datagram = mutated(&seeds[index as usize % seeds.len()], &mut numbers);
