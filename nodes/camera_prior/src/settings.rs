@@ -46,11 +46,7 @@ pub(crate) fn declare(node: &mut Node) -> anyhow::Result<Configuration> {
     let model =
         path(node, "model", "Network, an ONNX file; empty: searched beside the program and above it")?;
     let basis = match path(node, "basis", "Friction basis, a YAML file; empty: the released one")? {
-        Some(file) => {
-            let text = std::fs::read_to_string(&file)
-                .map_err(|source| FrictionError::Read { path: file, source })?;
-            Basis::from_yaml(&text)?
-        }
+        Some(file) => Basis::read_file(&file)?,
         None => Basis::builtin()?,
     };
     let region = Descriptor::new(

@@ -49,11 +49,7 @@ impl CameraArgs {
         let program = std::env::current_exe().context("cannot find out where this program is")?;
         let folder = program.parent().unwrap_or(Path::new("."));
         let basis = match &self.basis {
-            Some(path) => {
-                let text = std::fs::read_to_string(path)
-                    .with_context(|| format!("cannot read {}", path.display()))?;
-                Basis::from_yaml(&text).with_context(|| format!("cannot use {}", path.display()))?
-            }
+            Some(path) => Basis::read_file(path)?,
             None => Basis::builtin()?,
         };
         let calibration = self.calibration.as_deref().map(Calibration::read_file).transpose()?;

@@ -9,7 +9,9 @@ use clap::Args;
 use gripsight_bag::TopicMap;
 use gripsight_friction::{
     Calibration, Estimate, Example, FloorFriction, Frame, FrameData, FrictionEstimator, floor_friction,
+    read_picture,
 };
+use gripsight_identification::export::read_text;
 use gripsight_report::{CalibrationInput, CalibrationPicture, calibration_page};
 use serde_json::Value;
 
@@ -191,7 +193,7 @@ fn of_folder(label: &Label, estimator: &mut FrictionEstimator) -> anyhow::Result
     let count = files.len() as u32;
     let mut seen = Vec::new();
     for (k, file) in files.iter().enumerate() {
-        let bytes = fs::read(file).with_context(|| format!("cannot read {}", file.display()))?;
+        let bytes = read_picture(file)?;
         let estimate = estimator.read_single(&Frame { stamp_ns: 0, data: FrameData::Compressed(&bytes) });
         let part = k as u32 * PARTS.min(count) / count;
         let name = file.display().to_string();
@@ -243,9 +245,9 @@ fn of_drive(
 
 /// What an identification found of the floor, by the axles whose peak was reached and rests on no prior; none where there is nothing to learn from it,
 /// which is said.
-fn friction_found(results: &Path) -> anyhow::Result<Option<FloorFriction>> {
+pub(crate) fn friction_found(results: &Path) -> anyhow::Result<Option<FloorFriction>> {
     let path = results.join("identification.json");
-    let text = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    let text = read_text(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let found: Value =
         serde_json::from_str(&text).with_context(|| format!("cannot use {}", path.display()))?;
     if found["accepted"] != true {

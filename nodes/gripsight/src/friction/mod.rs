@@ -1,13 +1,12 @@
 //! `gripsight friction`: what pictures on disk say about the road, and what a track teaches.
 
-mod calibrate;
+pub(crate) mod calibrate;
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
 use clap::{Args, Subcommand};
 use gripsight_bag::TopicMap;
-use gripsight_friction::{Basis, Estimate, Frame, FrameData};
+use gripsight_friction::{Basis, Estimate, Frame, FrameData, read_picture};
 use serde_json::{Map, Value, json};
 
 use crate::Outcome;
@@ -75,7 +74,7 @@ pub(crate) fn run(args: &FrictionArgs) -> anyhow::Result<Outcome> {
             })?;
             continue;
         }
-        let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let bytes = read_picture(path)?;
         let estimate = estimator.read_single(&Frame { stamp_ns: 0, data: FrameData::Compressed(&bytes) });
         say(&path.display().to_string(), &estimate, estimator.basis());
     }

@@ -1,11 +1,20 @@
 //! The friction basis B: what each road state is worth, with its spread.
 
+use std::ops::RangeInclusive;
+use std::path::Path;
+
 use serde::Deserialize;
 
 use crate::error::FrictionError;
+use crate::files::read_text;
 
 /// The basis file of the suite, compiled in so that no installation is needed to read a picture.
 const DEFAULT: &str = include_str!("../../../../params/friction_basis.yaml");
+
+/// How many road states, and what each may be worth.
+const CLASSES: RangeInclusive<usize> = 2..=64;
+const FRICTIONS: RangeInclusive<f64> = 0.01..=3.0;
+const SIGMAS: RangeInclusive<f64> = 0.001..=3.0;
 
 /// A friction coefficient and its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -43,22 +52,38 @@ impl Basis {
     /// Reads a basis from YAML, as in `params/friction_basis.yaml`.
     ///
     /// # Errors
-    /// [`FrictionError::BadBasis`] where the text does not parse, has fewer than two classes, or a value is not positive.
+    /// [`FrictionError::BadBasis`] where the text does not parse, has not 2 to 64 classes, or a value is no friction (0.01 to 3) or no spread of one
+    /// (0.001 to 3).
     pub fn from_yaml(text: &str) -> Result<Self, FrictionError> {
         let basis: Self =
             serde_saphyr::from_str(text).map_err(|e| FrictionError::BadBasis { message: e.to_string() })?;
         let bad = |message: String| Err(FrictionError::BadBasis { message });
-        if basis.classes.len() < 2 {
-            return bad(format!("expected at least 2 classes, got {}", basis.classes.len()));
+        if !CLASSES.contains(&basis.classes.len()) {
+            return bad(format!("expected {CLASSES:?} classes, got {}", basis.classes.len()));
         }
         let pairs = basis.classes.iter().map(|c| (c.name.as_str(), c.mu, c.sigma));
         let last = ("uninformative", basis.uninformative.mu, basis.uninformative.sigma);
         for (name, mu, sigma) in pairs.chain([last]) {
-            if !(mu.is_finite() && mu > 0.0 && sigma.is_finite() && sigma > 0.0) {
-                return bad(format!("{name}: expected mu and sigma above 0, got {mu} and {sigma}"));
+            if !(FRICTIONS.contains(&mu) && SIGMAS.contains(&sigma)) {
+                return bad(format!(
+                    "{name}: expected mu of {FRICTIONS:?} and sigma of {SIGMAS:?}, got {mu} and {sigma}"
+                ));
             }
         }
         Ok(basis)
+    }
+
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`FrictionError::Read`], or as [`Basis::from_yaml`], with the file's name.
+    pub fn read_file(path: &Path) -> Result<Self, FrictionError> {
+        Self::from_yaml(&read_text(path)?).map_err(|error| match error {
+            FrictionError::BadBasis { message } => {
+                FrictionError::BadBasis { message: format!("{}: {message}", path.display()) }
+            }
+            other => other,
+        })
     }
 
     /// The basis that is compiled in: `params/friction_basis.yaml` of this version.

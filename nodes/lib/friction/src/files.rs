@@ -1,5 +1,7 @@
-//! Where the ONNX Runtime library and the model are looked for.
+//! Where the ONNX Runtime library and the model are looked for, and how much of a file is read.
 
+use std::fs::File;
+use std::io::{Error, ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 
 use crate::error::FrictionError;
@@ -32,6 +34,43 @@ pub fn find_model(explicit: Option<&Path>, program_folder: &Path) -> Result<Path
             .map(|place| a.join(place).join(MODEL))
     });
     find("model", explicit, beside.into_iter().chain(above))
+}
+
+/// No picture, basis or calibration is larger (bytes).
+const MOST_BYTES: u64 = 64 << 20;
+
+/// A picture's bytes.
+///
+/// # Errors
+/// [`FrictionError::Read`], also of more than 64 MiB, which are not read.
+pub fn read_picture(path: &Path) -> Result<Vec<u8>, FrictionError> {
+    read(path).map_err(|source| FrictionError::Read { path: path.to_path_buf(), source })
+}
+
+/// The text of a basis or a calibration.
+pub(crate) fn read_text(path: &Path) -> Result<String, FrictionError> {
+    let text = read(path).and_then(|bytes| {
+        String::from_utf8(bytes).map_err(|error| Error::new(ErrorKind::InvalidData, error))
+    });
+    text.map_err(|source| FrictionError::Read { path: path.to_path_buf(), source })
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, Error> {
+    let file = File::open(path)?;
+    within(file.metadata()?.len(), MOST_BYTES)?;
+    let mut bytes = Vec::new();
+    // What is no plain file does not tell its length.
+    file.take(MOST_BYTES + 1).read_to_end(&mut bytes)?;
+    within(bytes.len() as u64, MOST_BYTES)?;
+    Ok(bytes)
+}
+
+/// Refuses a file that is too large.
+pub(crate) fn within(length: u64, most: u64) -> Result<(), Error> {
+    if length <= most {
+        return Ok(());
+    }
+    Err(Error::new(ErrorKind::FileTooLarge, format!("it is larger than {} MiB", most >> 20)))
 }
 
 fn find(

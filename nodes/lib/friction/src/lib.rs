@@ -50,7 +50,7 @@ pub use decode::decode;
 pub use error::FrictionError;
 pub use estimate::{Estimate, Reason, Source};
 pub use estimator::{FrictionEstimator, Motion};
-pub use files::{find_library, find_model};
+pub use files::{find_library, find_model, read_picture};
 pub use filter::{DistanceFilter, FilterSettings};
 pub use learner::{Learner, Lesson};
 pub use look::Look;

@@ -6,10 +6,16 @@ use std::sync::Mutex;
 use ort::environment::Environment;
 use ort::session::Session;
 use ort::session::builder::GraphOptimizationLevel;
-use ort::value::TensorRef;
+use ort::value::{Outlet, TensorElementType, TensorRef, ValueType};
 
 use crate::error::FrictionError;
+use crate::files::within;
 use crate::tensor::INPUT_SIDE;
+
+/// No model of a road's picture is larger (bytes).
+const MOST_BYTES: u64 = 512 << 20;
+/// No model tells more road states, or more of how unlike its training a picture is.
+const MOST_OUTPUTS: i64 = 64;
 
 /// What a network says of one picture.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -73,10 +79,49 @@ fn open(environment: &Environment, model: &Path) -> Result<Session, String> {
         .map_err(text)?
         .with_intra_op_spinning(false)
         .map_err(text)?;
+    let length = std::fs::metadata(model).map_err(|e| e.to_string())?.len();
+    within(length, MOST_BYTES).map_err(|e| e.to_string())?;
     let session = builder.commit_from_file(model).map_err(|e| e.to_string())?;
-    match (session.inputs().len(), session.outputs().len()) {
-        (1, 1 | 2) => Ok(session),
-        (inputs, outputs) => Err(format!("expected 1 input and 1 or 2 outputs, got {inputs} and {outputs}")),
+    let (inputs, outputs) = (session.inputs(), session.outputs());
+    if inputs.len() != 1 || !(1..=2).contains(&outputs.len()) {
+        return Err(format!(
+            "expected 1 input and 1 or 2 outputs, got {} and {}",
+            inputs.len(),
+            outputs.len()
+        ));
+    }
+    let side = i64::from(INPUT_SIDE);
+    takes(&inputs[0], &[1, 3, side, side])?;
+    outputs.iter().try_for_each(gives_few)?;
+    Ok(session)
+}
+
+/// Refuses an input of another shape; a size that is left open (-1) is any.
+fn takes(input: &Outlet, expected: &[i64]) -> Result<(), String> {
+    let shape = floats(input)?;
+    let fits = shape.len() == expected.len()
+        && shape.iter().zip(expected).all(|(got, expected)| *got == -1 || got == expected);
+    if fits {
+        Ok(())
+    } else {
+        Err(format!("input {:.40?}: expected {expected:?}, got {shape:?}", input.name()))
+    }
+}
+
+/// Refuses an output that is large by itself.
+fn gives_few(output: &Outlet) -> Result<(), String> {
+    let shape = floats(output)?;
+    let few = shape.iter().try_fold(1_i64, |all, size| all.checked_mul((*size).max(1)));
+    match few {
+        Some(..=MOST_OUTPUTS) => Ok(()),
+        _ => Err(format!("output {:.40?}: at most {MOST_OUTPUTS} numbers, got {shape:?}", output.name())),
+    }
+}
+
+fn floats(outlet: &Outlet) -> Result<&[i64], String> {
+    match outlet.dtype() {
+        ValueType::Tensor { ty: TensorElementType::Float32, shape, .. } => Ok(shape),
+        other => Err(format!("{:.40?}: expected a tensor of float32, got {other:.80}", outlet.name())),
     }
 }
 
@@ -87,6 +132,10 @@ impl Network for OnnxRuntime {
         let input = TensorRef::from_array_view(([1, 3, side, side], tensor)).map_err(failed)?;
         let outputs = self.session.run(ort::inputs![input]).map_err(failed)?;
         let (_, logits) = outputs[0].try_extract_tensor::<f32>().map_err(failed)?;
+        if logits.len() as i64 > MOST_OUTPUTS {
+            let message = format!("expected at most {MOST_OUTPUTS} logits, got {}", logits.len());
+            return Err(FrictionError::Inference { message });
+        }
         let unfamiliarity = match outputs.len() {
             1 => None,
             _ => outputs[1].try_extract_tensor::<f32>().map_err(failed)?.1.first().copied(),

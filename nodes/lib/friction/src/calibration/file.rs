@@ -7,6 +7,7 @@ use sha2::{Digest, Sha256};
 
 use crate::appearance::APPEARANCE;
 use crate::error::FrictionError;
+use crate::files::read_text;
 
 use super::{Calibration, Errors, Example, Kernel, bad};
 
@@ -30,21 +31,25 @@ struct Content {
     hash: String,
 }
 
+fn hash(track: &str, examples: &[Example]) -> String {
+    let mut hasher = Sha256::new();
+    hasher.update(SCHEMA);
+    hasher.update(track);
+    for e in examples {
+        hasher.update(&e.source);
+        hasher.update(e.part.to_le_bytes());
+        for x in e.appearance.iter().chain([&e.mu, &e.sigma, &e.network_mu.unwrap_or(-1.0)]) {
+            hasher.update(x.to_le_bytes());
+        }
+    }
+    hasher.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+}
+
 impl Calibration {
     /// Names what was learned, from what: the first 16 digits of the SHA-256 of the examples and the track.
     #[must_use]
     pub fn hash(&self) -> String {
-        let mut hasher = Sha256::new();
-        hasher.update(SCHEMA);
-        hasher.update(self.track());
-        for e in self.examples() {
-            hasher.update(&e.source);
-            hasher.update(e.part.to_le_bytes());
-            for x in e.appearance.iter().chain([&e.mu, &e.sigma, &e.network_mu.unwrap_or(-1.0)]) {
-                hasher.update(x.to_le_bytes());
-            }
-        }
-        hasher.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+        hash(self.track(), self.examples())
     }
 
     /// The file's text.
@@ -76,19 +81,19 @@ impl Calibration {
     pub fn from_json(text: &str) -> Result<Self, FrictionError> {
         let content: Content = serde_json::from_str(text).map_err(|e| bad(e.to_string()))?;
         if content.schema != SCHEMA {
-            return Err(bad(format!("schema {:?}: expected {SCHEMA}", content.schema)));
+            return Err(bad(format!("schema {:.40?}: expected {SCHEMA}", content.schema)));
         }
         if content.features != APPEARANCE {
-            return Err(bad(format!("features {:?}: expected {APPEARANCE:?}", content.features)));
+            return Err(bad(format!("{} features, or others than {APPEARANCE:?}", content.features.len())));
         }
-        let calibration = Self::learn(&content.track, &content.examples)?;
-        if calibration.hash() != content.hash {
+        // First of all: learning takes its time, and what was changed is not worth it.
+        if hash(&content.track, &content.examples) != content.hash {
             return Err(bad(format!(
-                "hash {} is not that of its examples: the file was changed",
+                "hash {:.16} is not that of its examples: the file was changed",
                 content.hash
             )));
         }
-        Ok(calibration)
+        Self::learn(&content.track, &content.examples)
     }
 
     /// Reads a file.
@@ -96,9 +101,7 @@ impl Calibration {
     /// # Errors
     /// [`FrictionError::Read`], or as [`Calibration::from_json`].
     pub fn read_file(path: &Path) -> Result<Self, FrictionError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| FrictionError::Read { path: path.to_path_buf(), source })?;
-        Self::from_json(&text).map_err(|error| bad(format!("{}: {error}", path.display())))
+        Self::from_json(&read_text(path)?).map_err(|error| bad(format!("{}: {error}", path.display())))
     }
 
     /// Writes the file: to a temporary one beside it, which then takes its place.
