@@ -10,7 +10,7 @@ use clap::error::ErrorKind;
 use clap::{Args, Command};
 use gripsight_bag::{ReadReport, Role, TopicMap, read_sequences};
 use gripsight_diagnosis::{Diagnosis, Earlier, ExtendedModelFile, Request, Together, Verdict, diagnose};
-use gripsight_identification::export::{read_tires, stamp_text};
+use gripsight_identification::export::{read_text, read_tires, stamp_text};
 use gripsight_identification::vehicle_hash;
 use gripsight_model::EffectId;
 use gripsight_report::{Before, GapInput, Header, TopicUse, gap_page, gap_text, topic_uses};
@@ -315,19 +315,19 @@ pub(crate) fn vehicle(path: Option<&Path>) -> anyhow::Result<VehicleParameters> 
         tracing::warn!("no --vehicle: taking the values of an F1TENTH-class 1:10 car");
         return Ok(VehicleParameters::f1tenth());
     };
-    let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let text = read_text(path).with_context(|| format!("cannot read {}", path.display()))?;
     VehicleParameters::from_ros_yaml(&text).with_context(|| format!("cannot use {}", path.display()))
 }
 
 /// The tires of a file.
 pub(crate) fn tires(path: &Path) -> anyhow::Result<gripsight_vehicle::PacejkaParameters> {
-    let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let text = read_text(path).with_context(|| format!("cannot read {}", path.display()))?;
     read_tires(&text).with_context(|| format!("cannot use {}", path.display()))
 }
 
 /// The car's own tires of a file.
-fn posterior(path: &Path) -> anyhow::Result<TirePosterior> {
-    let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+pub(crate) fn posterior(path: &Path) -> anyhow::Result<TirePosterior> {
+    let text = read_text(path).with_context(|| format!("cannot read {}", path.display()))?;
     let posterior: TirePosterior =
         serde_json::from_str(&text).with_context(|| format!("cannot use {}", path.display()))?;
     posterior.checked().with_context(|| format!("cannot use {}", path.display()))
@@ -335,7 +335,7 @@ fn posterior(path: &Path) -> anyhow::Result<TirePosterior> {
 
 /// The extended model of a file.
 pub(crate) fn extended_model(path: &Path) -> anyhow::Result<ExtendedModelFile> {
-    let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let text = read_text(path).with_context(|| format!("cannot read {}", path.display()))?;
     ExtendedModelFile::from_yaml(&text).with_context(|| format!("cannot use {}", path.display()))
 }
 

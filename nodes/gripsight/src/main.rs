@@ -14,6 +14,8 @@ mod data;
 mod diagnose;
 mod export;
 mod friction;
+#[cfg(test)]
+mod hostile;
 mod identify;
 mod invocation;
 mod notes;

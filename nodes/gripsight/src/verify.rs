@@ -1,12 +1,11 @@
 //! `gripsight verify`: a set tried on another drive, before it is raced with.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::Args;
 use gripsight_bag::{TopicMap, read_sequences};
-use gripsight_identification::export::{read_tires, read_valid_within};
+use gripsight_identification::export::{checked_tires, read_text, read_tires, read_valid_within};
 use gripsight_identification::{AxleCheck, Config, ResidualKind, Status, ValidWithin, identify, verify};
 use gripsight_report::text::{fixed, percent};
 use gripsight_signals::WindowConfig;
@@ -53,15 +52,16 @@ struct Limits {
     force_n: gripsight_identification::PerAxle<Option<f64>>,
 }
 
-fn read_set(path: &Path) -> anyhow::Result<(PacejkaParameters, Option<ValidWithin>)> {
-    let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+pub(crate) fn read_set(path: &Path) -> anyhow::Result<(PacejkaParameters, Option<ValidWithin>)> {
+    let text = read_text(path).with_context(|| format!("cannot read {}", path.display()))?;
     if text.trim_start().starts_with('{') {
         let file: Identified = serde_json::from_str(&text)
             .with_context(|| format!("{} is not an identification.json", path.display()))?;
         let known = |v: gripsight_identification::PerAxle<Option<f64>>| v.map(|v| v.unwrap_or(f64::NAN));
         let limits =
             file.valid_within.map(|l| ValidWithin { slip_rad: known(l.slip_rad), force_n: known(l.force_n) });
-        return Ok((file.phi_p, limits));
+        let tires = checked_tires(file.phi_p).with_context(|| format!("cannot use {}", path.display()))?;
+        return Ok((tires, limits));
     }
     let tires = read_tires(&text).with_context(|| format!("cannot use {}", path.display()))?;
     Ok((tires, read_valid_within(&text)))
@@ -70,8 +70,7 @@ fn read_set(path: &Path) -> anyhow::Result<(PacejkaParameters, Option<ValidWithi
 pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Outcome> {
     let (set, valid) = read_set(&args.set)?;
     let topics = args.topics.as_deref().map(TopicMap::read).transpose()?.unwrap_or_default();
-    let text = fs::read_to_string(&args.vehicle)
-        .with_context(|| format!("cannot read {}", args.vehicle.display()))?;
+    let text = read_text(&args.vehicle).with_context(|| format!("cannot read {}", args.vehicle.display()))?;
     let vehicle = VehicleParameters::from_ros_yaml(&text)
         .with_context(|| format!("cannot use {}", args.vehicle.display()))?;
     let window = WindowConfig { length_s: f64::INFINITY, hop_s: f64::INFINITY };

@@ -1,11 +1,11 @@
 //! The car of a result's folder.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, bail};
 use gripsight_diagnosis::ExtendedModelFile;
+use gripsight_identification::export::{checked_tires, read_text};
 use gripsight_identification::{Nuisance, SignalCorrections, Status};
 use gripsight_model::{CarFile, EffectId, OutsideTerm};
 use gripsight_vehicle::{PacejkaParameters, TirePosterior, VehicleParameters};
@@ -30,38 +30,38 @@ struct Identified {
 }
 
 /// The car of a result, and whether its tires are its own: fitted to the signals as recorded.
-pub(super) fn car(result: &Path) -> anyhow::Result<(CarFile, bool)> {
+pub(crate) fn car(result: &Path) -> anyhow::Result<(CarFile, bool)> {
     let read = |name: &str| {
         let path = result.join(name);
-        fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))
+        read_text(&path).with_context(|| format!("cannot read {}", path.display()))
     };
+    let of = |name: &str| format!("cannot use {}", result.join(name).display());
     if result.join("gap.json").is_file() {
-        let not_one = "gap.json does not tell the car: diagnose again";
-        let diagnosed: Diagnosed = serde_json::from_str(&read("gap.json")?).context(not_one)?;
+        let not_one = || format!("{}: it does not tell the car: diagnose again", of("gap.json"));
+        let diagnosed: Diagnosed = serde_json::from_str(&read("gap.json")?).with_context(not_one)?;
+        let vehicle = diagnosed.vehicle.checked().with_context(|| of("gap.json"))?;
         let text = read("extended_model.yaml")
             .context("there is no model in it: the data could not tell, or a simulator was diagnosed")?;
-        let model = ExtendedModelFile::from_yaml(&text)?;
+        let model = ExtendedModelFile::from_yaml(&text).with_context(|| of("extended_model.yaml"))?;
         let effects = model.usual.into_iter().chain(model.effects).collect();
-        return Ok((CarFile { vehicle: diagnosed.vehicle, tires: model.tires, effects }, false));
+        return Ok((CarFile { vehicle, tires: model.tires, effects }, false));
     }
     if !result.join("identification.json").is_file() {
         bail!("{} is not the folder of an identification or a diagnosis", result.display());
     }
     let identified: Identified = serde_json::from_str(&read("identification.json")?)
-        .context("identification.json is not one of this version")?;
+        .with_context(|| format!("{}: it is not one of this version", of("identification.json")))?;
     if identified.status == Status::Rejected {
         bail!("that identification was rejected: its tires are not known");
     }
     let Identified { vehicle, found, signals, nuisance, .. } = identified;
+    let vehicle = vehicle.checked().with_context(|| of("identification.json"))?;
     if !result.join(POSTERIOR).is_file() {
-        return Ok((
-            CarFile { vehicle, tires: found, effects: effects_of(&signals, nuisance.relaxation_m) },
-            false,
-        ));
+        let tires = checked_tires(found).with_context(|| of("identification.json"))?;
+        return Ok((CarFile { vehicle, tires, effects: effects_of(&signals, nuisance.relaxation_m) }, false));
     }
-    let posterior: TirePosterior = serde_json::from_str(&read(POSTERIOR)?)
-        .with_context(|| format!("{POSTERIOR} is not one of this version"))?;
-    Ok((own_car(vehicle, &posterior.checked()?, &signals)?, true))
+    let posterior = crate::diagnose::posterior(&result.join(POSTERIOR))?;
+    Ok((own_car(vehicle, &posterior, &signals)?, true))
 }
 
 /// The car with its own tires and what was fitted along with them. They were fitted to the signals as recorded and have taken on what shows as other

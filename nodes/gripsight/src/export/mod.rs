@@ -12,7 +12,7 @@ use gripsight_model::CarFile;
 use gripsight_simulator::{Target, export};
 
 use crate::Outcome;
-use car::car;
+pub(crate) use car::car;
 
 /// Write the car that was found for another simulator.
 ///

@@ -1,7 +1,7 @@
 //! `gripsight identify`: a bag in, tires out.
 
 mod posterior;
-mod previous;
+pub(crate) mod previous;
 mod progress;
 mod summary;
 mod together;
@@ -16,7 +16,7 @@ use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use gripsight_bag::{ReadReport, TopicMap, read_sequences};
 use gripsight_diagnosis::{ExtendedModelFile, without_effects};
-use gripsight_identification::export::{Provenance, TireFiles};
+use gripsight_identification::export::{Provenance, TireFiles, read_text};
 use gripsight_identification::{
     self as identification, Config, FrictionPrior, Method, ResidualKind, Status, ValidWithin, identify,
 };
@@ -160,7 +160,7 @@ impl IdentifyArgs {
             tracing::warn!("no --vehicle: taking the values of an F1TENTH-class 1:10 car");
             return Ok(VehicleParameters::f1tenth());
         };
-        let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let text = read_text(path).with_context(|| format!("cannot read {}", path.display()))?;
         VehicleParameters::from_ros_yaml(&text).with_context(|| format!("cannot use {}", path.display()))
     }
 

@@ -1,9 +1,9 @@
 //! An earlier identification.json, as where to start.
 
-use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, bail};
+use gripsight_identification::export::{checked_tires, read_text};
 use gripsight_identification::{
     AcceptedSet, Nuisance, PerAxle, RunKey, SignalCorrections, Status, ValidWithin,
 };
@@ -52,8 +52,8 @@ struct Change {
 }
 
 /// Reads an accepted set.
-pub(super) fn read(path: &Path) -> anyhow::Result<AcceptedSet> {
-    let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+pub(crate) fn read(path: &Path) -> anyhow::Result<AcceptedSet> {
+    let text = read_text(path).with_context(|| format!("cannot read {}", path.display()))?;
     let not_one = || format!("{} is not an identification.json", path.display());
     // What was not accepted has no limits to read.
     let verdict: Verdict = serde_json::from_str(&text).with_context(not_one)?;
@@ -61,11 +61,12 @@ pub(super) fn read(path: &Path) -> anyhow::Result<AcceptedSet> {
         bail!("{}: that identification was not accepted", path.display());
     }
     let earlier: Earlier = serde_json::from_str(&text).with_context(not_one)?;
+    let tires = |set| checked_tires(set).with_context(|| format!("cannot use {}", path.display()));
     Ok(AcceptedSet {
         vehicle_hash: earlier.key.vehicle_hash,
         sequence_id: earlier.key.sequence_id,
-        phi_p: earlier.found,
-        promised: earlier.phi_p,
+        phi_p: tires(earlier.found)?,
+        promised: tires(earlier.phi_p)?,
         status: earlier.status,
         valid_within: earlier.valid_within,
         corrections: earlier.signals,

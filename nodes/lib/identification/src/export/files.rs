@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 use std::fs;
-use std::io::Write as _;
+use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
@@ -99,13 +99,33 @@ fn keep(place: &Path, text: &str, kept: &Path) -> Result<(), ExportError> {
     match fs::read(place) {
         Ok(old) if old != text.as_bytes() => replace_file(kept, &old),
         Ok(_) => Ok(()),
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(()),
         Err(source) => Err(ExportError::Io { path: place.to_owned(), source }),
     }
 }
 
 fn replace(place: &Path, text: &str) -> Result<(), ExportError> {
     replace_file(place, text.as_bytes())
+}
+
+/// No text that the suite writes or reads is larger (bytes).
+const MOST_TEXT: u64 = 64 << 20;
+
+/// Reads a text from outside.
+///
+/// # Errors
+/// As [`fs::read_to_string`]; a text above 64 MiB is [`io::ErrorKind::FileTooLarge`], and no more of it is read.
+pub fn read_text(path: &Path) -> io::Result<String> {
+    let mut text = String::new();
+    let file = fs::File::open(path)?;
+    // A sparse file of a terabyte is not worth reading in part either.
+    if file.metadata()?.len() > MOST_TEXT
+        || file.take(MOST_TEXT + 1).read_to_string(&mut text)? as u64 > MOST_TEXT
+    {
+        let error = format!("larger than {} MiB", MOST_TEXT >> 20);
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, error));
+    }
+    Ok(text)
 }
 
 /// Writes a file beside its place and renames it: a reader, and whoever comes after a process that was killed, sees the old file or the
@@ -133,7 +153,7 @@ pub fn replace_file(place: &Path, bytes: &[u8]) -> Result<(), ExportError> {
 
 fn remove(path: &Path) -> Result<(), ExportError> {
     match fs::remove_file(path) {
-        Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+        Err(source) if source.kind() != io::ErrorKind::NotFound => {
             Err(ExportError::Io { path: path.to_owned(), source })
         }
         _ => Ok(()),

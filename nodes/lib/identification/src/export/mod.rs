@@ -17,7 +17,7 @@ mod tests;
 mod tires;
 
 pub use error::ExportError;
-pub use files::{TireFiles, replace_file};
+pub use files::{TireFiles, read_text, replace_file};
 pub use lookup::SteeringLookup;
-pub use read::read_tires;
+pub use read::{checked_tires, read_tires};
 pub use tires::{Provenance, controller_txt, mpc_yaml, read_valid_within, stamp_text};

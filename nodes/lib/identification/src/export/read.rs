@@ -59,11 +59,19 @@ pub fn read_tires(text: &str) -> Result<PacejkaParameters, ExportError> {
             found: if found.is_empty() { "none".into() } else { found },
         });
     };
-    checked(tires)
+    checked_tires(tires)
 }
 
-fn checked(tires: PacejkaParameters) -> Result<PacejkaParameters, ExportError> {
-    // E may have either sign; that it is finite, the YAML reader has seen to.
+/// Tires of a file, where they are such as can be computed with.
+///
+/// # Errors
+/// [`ExportError::Parameter`] names what is no number, or not positive; E may have either sign.
+pub fn checked_tires(tires: PacejkaParameters) -> Result<PacejkaParameters, ExportError> {
+    if let Some((name, got)) =
+        [("E front", tires.front.e), ("E rear", tires.rear.e)].into_iter().find(|(_, e)| !e.is_finite())
+    {
+        return Err(ExportError::Parameter { name, got, must: "finite" });
+    }
     let numbers = [
         ("B front", tires.front.b),
         ("C front", tires.front.c),
