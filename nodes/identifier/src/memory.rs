@@ -1,13 +1,15 @@
 //! The set that the MPC was told last, on disk: a node that was killed comes back with what it knew.
 
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{SystemTime, UNIX_EPOCH};
 
-use gripsight_identification::export::{ExportError, replace_file};
+use gripsight_identification::export::{ExportError, read_text, replace_file};
 use gripsight_msgs::PacejkaParams;
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
-/// The file's text; YAML, because it has numbers that are none (what is not stated, and no limit).
+/// The file's text below its first line, which tells the text's hash: a number that a disk or a hand has changed promises another grip.
+/// YAML, because it has numbers that are none (what is not stated, and no limit).
 #[derive(Debug, Serialize, Deserialize)]
 struct Kept {
     /// When the set was accepted, by the machine's clock: it outlives the process, unlike `/clock`.
@@ -36,6 +38,7 @@ pub(crate) fn keep(folder: &Path, set: &PacejkaParams, now: SystemTime) -> Resul
             let accepted_unix_s = now.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
             let kept = Kept { accepted_unix_s, set: set.clone() };
             let text = serde_saphyr::to_string(&kept).map_err(|error| unusable(error.to_string()))?;
+            let text = format!("# {}\n{text}", sha256(&text));
             std::fs::create_dir_all(folder).map_err(|error| unusable(error.to_string()))?;
             Ok(replace_file(&place, text.as_bytes())?)
         }
@@ -58,12 +61,16 @@ pub(crate) fn recall(
 ) -> Result<Option<PacejkaParams>, MemoryError> {
     let path = place(folder, vehicle_hash);
     let unusable = |reason: String| MemoryError::Unusable { path: path.clone(), reason };
-    let text = match std::fs::read_to_string(&path) {
+    let text = match read_text(&path) {
         Ok(text) => text,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
         Err(error) => return Err(unusable(error.to_string())),
     };
-    let kept: Kept = serde_saphyr::from_str(&text).map_err(|error| unusable(error.to_string()))?;
+    let (hash, text) = text.split_once('\n').unwrap_or_default();
+    if hash.strip_prefix("# ") != Some(sha256(text).as_str()) {
+        return Err(unusable("it is not as it was written".to_owned()));
+    }
+    let kept: Kept = serde_saphyr::from_str(text).map_err(|error| unusable(error.to_string()))?;
     let mut set = kept.set;
     if set.handshake.vehicle_hash != vehicle_hash {
         return Err(unusable("it is of another car".to_owned()));
@@ -72,12 +79,19 @@ pub(crate) fn recall(
     if !curves.iter().all(|f| [f.b, f.c, f.d, f.e].iter().all(|number| number.is_finite())) {
         return Err(unusable("its curves are not finite".to_owned()));
     }
-    let accepted = UNIX_EPOCH + Duration::from_secs(kept.accepted_unix_s);
-    let age_s = now.duration_since(accepted).unwrap_or_default().as_secs();
+    let now_unix_s = now.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
+    let age = match now_unix_s.checked_sub(kept.accepted_unix_s) {
+        Some(age_s) => format!("accepted {age_s} s ago, before this start"),
+        None => "accepted before this start, by a clock that has gone back since".to_owned(),
+    };
     set.status = PacejkaParams::PROVISIONAL;
     let before = if set.reason.is_empty() { String::new() } else { format!("; {}", set.reason) };
-    set.reason = format!("from disk: accepted {age_s} s ago, before this start{before}");
+    set.reason = format!("from disk: {age}{before}");
     Ok(Some(set))
+}
+
+fn sha256(text: &str) -> String {
+    Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 fn place(folder: &Path, vehicle_hash: &str) -> PathBuf {
@@ -86,6 +100,10 @@ fn place(folder: &Path, vehicle_hash: &str) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
+    use gripsight_mutants::{Mutants, bombs, peak_memory_mb};
+
     use super::*;
 
     fn accepted() -> PacejkaParams {
@@ -126,22 +144,70 @@ mod tests {
         keep(folder.path(), &with(PacejkaParams::WITHDRAWN), now).unwrap();
     }
 
-    /// A file cut off anywhere, as by a full disk, is refused or whole: it never gives other tires.
+    /// Whatever has become of the file, it gives the set that was kept or none, and the error names it.
     #[test]
-    fn a_damaged_file_is_told() {
+    fn a_mutated_file_never_gives_another_set() {
         let folder = tempfile::tempdir().unwrap();
         let now = SystemTime::now();
         keep(folder.path(), &accepted(), now).unwrap();
         let path = place(folder.path(), "c0ffee");
-        let text = std::fs::read(&path).unwrap();
-        let mut refused = 0;
-        for length in (0..text.len()).step_by(7) {
-            std::fs::write(&path, &text[..length]).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let (mut mutants, mut refused) = (Mutants::new(0x5eed), 0);
+        let count = Mutants::count(4000);
+        let mutated = (0..count).map(|_| mutants.text(&text)).collect::<Vec<_>>();
+        let cut = (0..text.len()).map(|length| text[..length].to_owned());
+        for mutant in mutated.into_iter().chain(cut).chain(bombs()) {
+            std::fs::write(&path, &mutant).unwrap();
             match recall(folder.path(), "c0ffee", now) {
-                Err(_) => refused += 1,
-                Ok(set) => assert_eq!(set.unwrap().front, accepted().front),
+                Err(error) => {
+                    refused += 1;
+                    assert!(error.to_string().contains("last_set_c0ffee.yaml"), "{error}");
+                }
+                Ok(set) => {
+                    assert_eq!(mutant, text);
+                    assert_eq!(set.unwrap().front, accepted().front);
+                }
             }
         }
-        assert!(refused > text.len() / 7 / 2, "{refused}");
+        assert!(refused > count * 9 / 10, "{refused}");
+        assert!(peak_memory_mb().is_none_or(|peak_mb| peak_mb < 200.0), "{:?}", peak_memory_mb());
+    }
+
+    /// Whoever writes the hash, too, gets a refusal for what is no set, and no node dies of it.
+    #[test]
+    fn a_file_made_to_fit_is_answered() {
+        let folder = tempfile::tempdir().unwrap();
+        let now = SystemTime::now();
+        keep(folder.path(), &accepted(), now).unwrap();
+        let path = place(folder.path(), "c0ffee");
+        let text = std::fs::read_to_string(&path).unwrap();
+        let (_, text) = text.split_once('\n').unwrap();
+        let recall = |text: &str| {
+            std::fs::write(&path, format!("# {}\n{text}", sha256(text))).unwrap();
+            recall(folder.path(), "c0ffee", now)
+        };
+        let mut mutants = Mutants::new(0xfeed);
+        for _ in 0..Mutants::count(4000) {
+            if let Ok(set) = recall(&mutants.text(text)) {
+                assert!(set.unwrap().front.b.is_finite());
+            }
+        }
+        for bomb in bombs() {
+            assert!(recall(&bomb).is_err());
+        }
+        let at = text.lines().next().unwrap();
+        let later =
+            recall(&text.replacen(at, &format!("accepted_unix_s: {}", u64::MAX), 1)).unwrap().unwrap();
+        assert!(later.reason.contains("a clock that has gone back"), "{}", later.reason);
+        assert!(peak_memory_mb().is_none_or(|peak_mb| peak_mb < 200.0), "{:?}", peak_memory_mb());
+    }
+
+    #[test]
+    fn a_file_without_end_is_not_read_to_its_end() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = place(folder.path(), "c0ffee");
+        std::fs::File::create(&path).unwrap().set_len(1 << 40).unwrap();
+        let error = recall(folder.path(), "c0ffee", SystemTime::now()).unwrap_err().to_string();
+        assert!(error.contains("last_set_c0ffee.yaml") && error.contains("larger than"), "{error}");
     }
 }

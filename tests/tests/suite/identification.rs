@@ -20,7 +20,7 @@ const RUN: Duration = Duration::from_secs(90);
 const PRIOR: (f64, f64) = (0.9, 0.2);
 
 /// A drive of the reference car: bag and vehicle file.
-fn drive(folder: &Path) -> (PathBuf, PathBuf) {
+pub(crate) fn drive(folder: &Path) -> (PathBuf, PathBuf) {
     simulate(folder, &["--duration", "32", "--seed", "11", "--pace", "0.9"])
 }
 
@@ -39,45 +39,33 @@ pub(crate) fn simulate(folder: &Path, arguments: &[&str]) -> (PathBuf, PathBuf) 
 }
 
 /// telemetry, s4_residual and identifier, joined as the launchers join them.
-fn suite(domain: &Domain, vehicle: &Path, window_s: &str) -> [Process; 3] {
-    let vehicle = vehicle.to_str().unwrap();
-    let start = |name: &str, arguments: &[&str]| {
-        node(domain, name, &[arguments, &["--params-file", vehicle]].concat())
-    };
+pub(crate) fn suite(domain: &Domain, vehicle: &Path, window_s: &str) -> [Process; 3] {
     let (window, hop) = (format!("window_s:={window_s}"), format!("hop_s:={window_s}"));
     let window = ["-p", &window, "-p", &hop, "-p", "reliable_inputs:=true"];
     let topics = ["-r", "odom:=/car_state/odom", "-r", "imu:=/imu/data", "-r", "wheels:=/wheel_speeds"];
+    let residual = ["-r", "sequence:=telemetry/sequence", "-r", "candidate:=identifier/candidate"];
+    let follows = ["-r", "odom:=/car_state/odom", "-p", "reliable_inputs:=true"];
     [
-        start("telemetry", &[&window[..], &topics[..]].concat()),
-        start(
-            "s4_residual",
-            &[
-                "-r",
-                "sequence:=telemetry/sequence",
-                "-r",
-                "candidate:=identifier/candidate",
-                "-r",
-                "odom:=/car_state/odom",
-                "-p",
-                "reliable_inputs:=true",
-            ],
-        ),
-        start(
-            "identifier",
-            &[
-                "-r",
-                "sequence:=telemetry/sequence",
-                "-r",
-                "model:=s4_residual/model",
-                "-r",
-                "friction:=camera_prior/friction",
-            ],
-        ),
+        of_car(domain, "telemetry", vehicle, &[&window[..], &topics[..]].concat()),
+        of_car(domain, "s4_residual", vehicle, &[&residual[..], &follows[..]].concat()),
+        identifier(domain, vehicle, &[]),
     ]
 }
 
+/// The identifier, joined as the launchers join it.
+pub(crate) fn identifier(domain: &Domain, vehicle: &Path, more: &[&str]) -> Process {
+    let topics =
+        ["sequence:=telemetry/sequence", "model:=s4_residual/model", "friction:=camera_prior/friction"];
+    let topics = topics.iter().flat_map(|remap| ["-r", remap]).collect::<Vec<_>>();
+    of_car(domain, "identifier", vehicle, &[&topics, more].concat())
+}
+
+fn of_car(domain: &Domain, name: &str, vehicle: &Path, arguments: &[&str]) -> Process {
+    node(domain, name, &[arguments, &["--params-file", vehicle.to_str().unwrap()]].concat())
+}
+
 /// A peer tells the identifier the road's friction.
-fn tell_prior(domain: &Domain, python: &Path) {
+pub(crate) fn tell_prior(domain: &Domain, python: &Path) {
     let topic = ["publish", "/camera_prior/friction", "gripsight_msgs/msg/FrictionPrior", "--qos", "latched"];
     let mut peer = start_cyclone(domain, python, &topic);
     peer.feed(&json!({"source": 1, "valid": true, "mu": PRIOR.0, "sigma": PRIOR.1}).to_string());
@@ -85,7 +73,14 @@ fn tell_prior(domain: &Domain, python: &Path) {
 }
 
 /// A peer that prints what it hears; `latched` keeps the last message only, `reliable` every one.
-fn listen(domain: &Domain, python: &Path, topic: &str, kind: &str, qos: &str, count: &str) -> Process {
+pub(crate) fn listen(
+    domain: &Domain,
+    python: &Path,
+    topic: &str,
+    kind: &str,
+    qos: &str,
+    count: &str,
+) -> Process {
     let timeout = RUN.as_secs().to_string();
     start_cyclone(
         domain,
@@ -108,7 +103,7 @@ fn text(set: &PacejkaParams) -> String {
     format!("{set:?}")
 }
 
-fn accepted(peer: &Process) -> PacejkaParams {
+pub(crate) fn accepted(peer: &Process) -> PacejkaParams {
     let set: PacejkaParams = parsed(&peer.line(RUN));
     assert!(
         [PacejkaParams::ACCEPTED, PacejkaParams::ACCEPTED_WITHIN].contains(&set.status),

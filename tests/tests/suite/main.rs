@@ -12,6 +12,7 @@ mod hostile;
 mod identification;
 mod packaging;
 mod parameters;
+mod restart;
 mod runtime;
 mod sim_car;
 mod whole_suite;
