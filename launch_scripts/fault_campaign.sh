@@ -10,7 +10,7 @@ cd "$(dirname "$0")/.."
 
 folder=${CARGO_TARGET_DIR:-target}/release
 if [[ " $* " != *" --bin "* && " $* " != *" --help "* ]]; then
-    packages=(gripsight gripsight_telemetry gripsight_s4_residual gripsight_identifier gripsight_bag_player gripsight_fault_injector)
+    packages=(gripsight gripsight_telemetry gripsight_s4_residual gripsight_identifier gripsight_camera_prior gripsight_bag_player gripsight_fault_injector)
     cargo build --locked --release "${packages[@]/#/-p}"
     set -- "$@" --bin "$folder"
 fi

@@ -8,7 +8,8 @@ of a drive of 62 s. Writes OUT/runs.csv (a row a run, those without faults first
 
 A set is harmful where it promises, anywhere within its slips, more than 10 % of the largest true force driven above the true curve, which is the
 Magic Formula fitted to the plant's own F_y / F_z. A run has recovered when every node lives and reports, the last window has been identified, and
-a usable set came from a window that ended after the last fault, and every file written is whole. It hangs when a node does not end within 2 s of SIGINT.
+a usable set came from a window that ended after the last fault, a valid reading of the camera came after it, and every file written is whole. The camera
+is fooled where it gives a valid reading of a picture that was black. It hangs when a node does not end within 2 s of SIGINT.
 """
 
 import argparse
@@ -17,6 +18,7 @@ import math
 import os
 import pathlib
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -34,6 +36,7 @@ HARMFUL = 0.1
 END_S = 2.0
 LAST_RUN_S = 40.0
 PROPOSED, USABLE = 1, (2, 4)
+CAMERA = 2
 DRIVES = [
     ("f1tenth", "club", 0.9, 0.9, 21),
     ("f1tenth", "esses", 0.7, 0.85, 22),
@@ -45,11 +48,15 @@ DRIVES = [
 NODES = {
     "telemetry": [],
     "s4_residual": ["-r", "sequence:=telemetry/sequence", "-r", "candidate:=identifier/candidate"],
-    "identifier": ["-r", "sequence:=telemetry/sequence", "-r", "model:=s4_residual/model"],
+    "identifier": ["-r", "sequence:=telemetry/sequence", "-r", "model:=s4_residual/model", "-r", "friction:=camera_prior/friction"],
+    # The reference car's pictures show nothing but road, and are renders; their stamps are the bag's.
+    "camera_prior": ["-r", "pacejka:=identifier/pacejka", "-p", "use_sim_time:=true", "-p", "input:=compressed", "-p", "region:=full",
+                     "-p", "network_error:=0.1"],
 }
-TO_INJECTOR = {"/car_state/odom": "/in/odom", "/drive": "/in/drive", "/imu/data": "/in/imu", "/wheel_speeds": "/in/wheels"}
-PROCESS_KINDS = ["killed telemetry", "killed s4_residual", "killed identifier", "stood still telemetry", "stood still s4_residual",
-                 "stood still identifier", "peer restarted", "second identifier", "subscriber stands still"]
+TO_INJECTOR = {"/car_state/odom": "/in/odom", "/drive": "/in/drive", "/imu/data": "/in/imu", "/wheel_speeds": "/in/wheels",
+               "/camera/image/compressed": "/in/image/compressed"}
+PROCESS_KINDS = ["killed telemetry", "killed s4_residual", "killed identifier", "killed camera_prior", "stood still telemetry",
+                 "stood still s4_residual", "stood still identifier", "stood still camera_prior", "peer restarted", "second identifier", "subscriber stands still"]
 
 # This machine only, as rmw_cyclonedds_cpp sets it up for LOCALHOST where the loopback has no multicast.
 CYCLONE = (
@@ -93,7 +100,7 @@ class Drive:
         self.vehicle = self.bag.with_suffix(".vehicle.yaml")
         if not self.bag.exists():
             numbers = ["--mu", mu, "--pace", pace, "--seed", seed, "--duration", DURATION_S]
-            command = [simulate, "simulate", "--car", car, "--track", track, "--realistic", "--out", self.bag, *numbers]
+            command = [simulate, "simulate", "--car", car, "--track", track, "--realistic", "--camera", "--out", self.bag, *numbers]
             subprocess.run([str(part) for part in command], check=True, stdout=subprocess.DEVNULL)
         with self.bag.with_suffix(".truth.csv").open() as file:
             rows = list(csv.DictReader(file))
@@ -131,6 +138,7 @@ class Heard:
         self.readers = {
             "set": of("/identifier/pacejka", "gripsight_msgs", "PacejkaParams", "latched"),
             "end": of("/identifier/candidate", "gripsight_msgs", "PacejkaParams", "latched"),
+            "friction": of("/camera_prior/friction", "gripsight_msgs", "FrictionPrior", "reliable"),
             "window": of("/telemetry/excitation", "gripsight_msgs", "Excitation", "latched"),
             "diagnostics": of("/diagnostics", "diagnostic_msgs", "DiagnosticArray", "reliable"),
         }
@@ -171,7 +179,9 @@ class Run:
 
     def injector(self, draw):
         lot = ["-p", f"draw:={draw}", "-p", f"seed:={self.seed}", "-p", f"from_s:={SPAN_S[0]}", "-p", f"to_s:={SPAN_S[1]}"]
-        self.start("fault_injector", [*lot, "-p", 'topics:=["odom","drive","imu","wheels"]'])
+        if self.args.kinds:
+            lot += ["-p", "kinds:=[" + ",".join(f'"{kind}"' for kind in self.args.kinds.split(",")) + "]"]
+        self.start("fault_injector", [*lot, "-p", 'topics:=["odom","drive","imu","wheels","image/compressed"]'])
 
     def log(self, name):
         path = self.logs / f"{name}.log"
@@ -249,8 +259,11 @@ class Run:
         usable = [m for _, m in results() if m.status in USABLE and ended.get(m.handshake.sequence_id, 0.0) > last_fault]
         sets = [m for _, m in self.heard.since(start, "set") if m.status in USABLE]
         promised = [self.drive.promised_too_much(m) for m in sets]
+        readings = [(when, m) for when, m in self.heard.since(start, "friction") if m.source == CAMERA and m.valid]
+        sees = any(when > last_fault for when, _ in readings)
+        fooled = self.fooled(topic_faults, [m for _, m in readings])
         torn = [path.name for path in (self.logs / "files").glob("[!.]*.yaml") if not whole(path)]
-        for text, found in ((f"not whole: {torn}", torn), ("the last window was not identified", not identified), (f"silent: {silent}", silent), (f"ended: {dead}", dead)):
+        for text, found in ((f"not whole: {torn}", torn), ("the last window was not identified", not identified), (f"silent: {silent}", silent), ("the camera reads nothing", not sees), (f"ended: {dead}", dead)):
             if found:
                 self.notes.append(text)
         if not usable:
@@ -259,11 +272,20 @@ class Run:
         row = {
             "drive": self.drive.name, "seed": self.seed, "faults": len(topic_faults) + len(made), "sets": len(sets),
             "usable_after": len(usable), "promised_too_much": f"{max(promised, default=math.nan):.4f}",
-            "harmful": sum(p > HARMFUL for p in promised), "recovered": int(identified and not silent and not dead and not torn and bool(usable)),
-            "hang": int(took > END_S), "end_s": f"{took:.2f}", "played_s": f"{played - began:.1f}", "note": " | ".join(self.notes),
+            "harmful": sum(p > HARMFUL for p in promised), "recovered": int(identified and not silent and not dead and not torn and sees and bool(usable)),
+            "fooled": fooled, "hang": int(took > END_S), "end_s": f"{took:.2f}", "played_s": f"{played - began:.1f}", "note": " | ".join(self.notes),
         }
         faults = [(f[0], f[1], f[2], f[3], f[4]) for f in topic_faults] + [(kind, "", f"{at:.2f}", "", "") for kind, at in made]
         return row, faults
+
+    def fooled(self, faults, readings):
+        """Valid readings of pictures that were black, by their stamps; none is counted where these were harmed, too."""
+        pictures = [(fault[0], float(fault[2]), float(fault[3])) for fault in faults if fault[1] == "image/compressed"]
+        first = re.search(r"the first message is stamped (\d+) ns", self.log("fault_injector"))
+        if first is None or any(kind == "time" for kind, _, _ in pictures):
+            return 0
+        after_s = [m.header.stamp.sec + 1e-9 * m.header.stamp.nanosec - 1e-9 * int(first[1]) for m in readings]
+        return sum(begin <= at < begin + length for kind, begin, length in pictures if kind == "dark" for at in after_s)
 
     def end(self):
         """Ends all by SIGINT; the time that the slowest took, infinite where one had to be killed."""
@@ -322,6 +344,7 @@ def table(out, command):
         f"| runs | {len(plain_runs)} | {len(harmed)} |",
         f"| faults | 0 | {len(faults)} |",
         f"| recovered | {count('recovered', plain_runs)} | {count('recovered', harmed)} |",
+        f"| valid readings of black pictures | {count('fooled', plain_runs)} | {count('fooled', harmed)} |",
         f"| hangs | {count('hang', plain_runs)} | {count('hang', harmed)} |",
         f"| sets at the MPC's topic | {count('sets', plain_runs)} | {sets} |",
         f"| runs with a set that promises over 10 % too much, where the drive without faults has none | | {len(harmful)} |",
@@ -361,6 +384,7 @@ def main():
     parser.add_argument("--rate", type=float, default=10.0)
     parser.add_argument("--minutes", type=float, default=math.inf, help="begin no run after this time")
     parser.add_argument("--domain", type=int, default=int(os.environ.get("ROS_DOMAIN_ID", 90)))
+    parser.add_argument("--kinds", help="draw these faults of topics alone, with commas between")
     parser.add_argument("--drives", type=int, default=len(DRIVES))
     args = parser.parse_args()
     os.environ["ROS_DOMAIN_ID"] = str(args.domain)

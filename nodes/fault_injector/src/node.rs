@@ -124,7 +124,11 @@ impl Shared {
     /// Seconds after the first message; tells faults that begin and end.
     fn time_s(&mut self, stamp: Time) -> f64 {
         let now_ns = i64::from(stamp.sec) * 1_000_000_000 + i64::from(stamp.nanosec);
-        let time_s = (now_ns - *self.start_ns.get_or_insert(now_ns)) as f64 * 1e-9;
+        let start_ns = *self.start_ns.get_or_insert_with(|| {
+            tracing::info!("the first message is stamped {now_ns} ns");
+            now_ns
+        });
+        let time_s = (now_ns - start_ns) as f64 * 1e-9;
         while let Some(fault) = self.faults.get(self.begun).filter(|fault| fault.start_s <= time_s) {
             tracing::info!("fault {} of {}: {fault}", self.begun + 1, self.faults.len());
             self.begun += 1;
