@@ -491,6 +491,19 @@ mod tests {
         assert!((s.mean[0][1][0] - 2.0).abs() < 4.0 * s.sigma[0][1][0] && s.sigma[0][1][0] < 0.3);
     }
 
+    /// Of two terms that pull opposite ways the data like the one a little better by a value that it cannot have.
+    #[test]
+    fn the_best_configuration_rests_on_no_impossible_value() {
+        let information = DMatrix::from_row_slice(2, 2, &[400.0, -396.0, -396.0, 400.0]);
+        let problem = Quadratic { information, gradient: DVector::from_row_slice(&[400.0, -396.0]) };
+        let mut terms = terms();
+        terms.truncate(2);
+        let best = |terms: &[Term]| select(&problem, 1.0, terms, &[1, 0], 1).unwrap().best;
+        assert_eq!(best(&terms), [1, 0]);
+        terms[0].priors[0].bounds = [0.0, f64::INFINITY];
+        assert_eq!(best(&terms), [0, 1]);
+    }
+
     #[test]
     fn what_the_data_cannot_tell_apart_shares_its_probability() {
         let (problem, terms) = (problem(8.0), terms());
