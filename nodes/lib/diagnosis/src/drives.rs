@@ -151,7 +151,11 @@ pub(crate) fn of_one_state(
     for (&i, own) in one_state.iter().zip(explained) {
         (all.drives[i].retuned, all.drives[i].after) = (own.retuned, own.after);
     }
-    let apart = "the drives are not in one state: only those that agree with each other are explained";
+    let apart = if one_state.len() > 1 {
+        "the drives are not in one state: only those that agree with each other are explained"
+    } else {
+        "no two of the drives are in one state: one of them is explained, and the others are held against it"
+    };
     diagnosis.reasons.insert(0, apart.to_owned());
     diagnosis.drives = all.drives;
     Ok(diagnosis)

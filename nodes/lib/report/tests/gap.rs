@@ -306,6 +306,7 @@ fn of_several_drives_each_says_whether_it_agrees() {
     d.drives = vec![
         drive("a.mcap", Some(Vec::new())),
         drive("b.mcap", Some(std::mem::take(&mut d.changes))),
+        drive("d.mcap", Some(Vec::new())),
         DriveAnswer { retuned: Estimate::UNKNOWN, after: Estimate::UNKNOWN, ..drive("c.mcap", None) },
     ];
     let text = gap_text(&d, None, &[]);
@@ -319,6 +320,9 @@ fn of_several_drives_each_says_whether_it_agrees() {
     assert!(line("b.mcap, 31 s").ends_with(said), "{text}");
     let html = page(&d);
     assert!(html.contains("Drive by drive") && html.contains(said));
+    d.drives.remove(2);
+    let text = gap_text(&d, None, &[]);
+    assert!(text.lines().any(|l| l.ends_with("what the others are held against")), "{text}");
     assert!(!page(&diagnosis()).contains("Drive by drive"));
 }
 

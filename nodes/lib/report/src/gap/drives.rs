@@ -25,7 +25,7 @@ pub(super) fn lines(out: &mut String, d: &Diagnosis) {
             "{head:<10} {}, {} s: {errors}; {}",
             drive.name,
             fixed(drive.duration_s, 0),
-            contradicts(drive)
+            contradicts(d, drive)
         );
         head = "";
     }
@@ -43,7 +43,7 @@ pub(super) fn table(d: &Diagnosis) -> Markup {
                         td { (fixed(drive.duration_s, 0)) " s" }
                         td { (known(&drive.retuned)) }
                         td { (known(&drive.after)) }
-                        td { (contradicts(drive)) }
+                        td { (contradicts(d, drive)) }
                     }
                 }
             }
@@ -56,13 +56,21 @@ fn known(error: &Estimate) -> String {
     if error.value.is_finite() { figure(error) } else { "–".to_owned() }
 }
 
-fn contradicts(drive: &DriveAnswer) -> String {
+fn contradicts(d: &Diagnosis, drive: &DriveAnswer) -> String {
     match drive.contradicts.as_deref() {
         None => "not compared with the others: too short by itself, or with other signals".to_owned(),
+        Some([]) if is_alone(d) => "what the others are held against".to_owned(),
         Some([]) => "agrees with the others".to_owned(),
         Some(changes) => {
             let said: Vec<String> = changes.iter().map(change_words).collect();
             format!("contradicts the others: {}", said.join("; "))
         }
     }
+}
+
+/// Whether drives contradict and no two of them agree: one is what the others are held against.
+fn is_alone(d: &Diagnosis) -> bool {
+    let (agree, differ): (Vec<_>, Vec<_>) =
+        d.drives.iter().filter_map(|d| d.contradicts.as_ref()).partition(|c| c.is_empty());
+    agree.len() == 1 && !differ.is_empty()
 }
