@@ -18,8 +18,10 @@ use crate::plan::Plan;
 use crate::probation::{GivenBack, Probation};
 use crate::profile::{Drivetrain, SpeedProfile};
 use crate::progress::Progress;
-use crate::pursuit::{Moment, Pursuit};
-use crate::state::{Asked, CarState, DriveCommand, predict, wheels_rad};
+use crate::predictive::{Predicting, Predictive, Solves};
+use crate::pursuit::{Pursuing, Pursuit};
+use crate::state::{Asked, CarState, DriveCommand, wheels_rad};
+use crate::steering::{Controller, Moment, Steering};
 use crate::tires::{TireSet, Trust};
 use crate::trial::{Memory, Model, Trial, trial};
 use crate::{Actuator, DrivingError, Longitudinal, Place, Track};
@@ -35,8 +37,12 @@ pub struct Settings {
     pub prior_step: f64,
     /// Grip planned over what the set promises at most, where the peak is not known: a promise is the lower end of an interval.
     pub beyond: f64,
+    /// Who steers.
+    pub controller: Controller,
     /// Pursuit.
     pub pursuit: Pursuit,
+    /// Predictive control.
+    pub predictive: Predictive,
     /// Gain of the speed controller.
     pub speed_gain_1ps: f64,
 }
@@ -48,18 +54,16 @@ impl Default for Settings {
             step: 1.15,
             prior_step: 1.2,
             beyond: 1.5,
+            controller: Controller::default(),
             pursuit: Pursuit::default(),
+            predictive: Predictive::default(),
             speed_gain_1ps: 4.0,
         }
     }
 }
 
-/// Delays below this are not worth a prediction.
-const PROMPT_S: f64 = 0.004;
 /// Longest delay that is made up for.
 const LATEST_S: f64 = 0.5;
-/// Time in which wheels that lag are brought where they are wanted.
-const LEAD_S: f64 = 0.06;
 /// Oldest state that is made up for: beyond, the clocks differ.
 const OLDEST_S: f64 = 0.2;
 /// Share of the most likely peak to explore up to, where it was not reached.
@@ -118,7 +122,8 @@ pub struct Driver {
     plan: Plan,
     governor: Governor,
     progress: Progress,
-    trim_rad: f64,
+    pursuing: Pursuing,
+    predicting: Option<Predicting>,
     place: Option<Place>,
     asked: VecDeque<Asked>,
 }
@@ -160,7 +165,9 @@ impl Driver {
             plan,
             governor: Governor::default(),
             progress,
-            trim_rad: 0.0,
+            pursuing: Pursuing::new(settings.pursuit),
+            predicting: (settings.controller == Controller::Predictive)
+                .then(|| Predicting::new(settings.predictive)),
             place: None,
             asked: VecDeque::new(),
         })
@@ -290,6 +297,12 @@ impl Driver {
         &self.track
     }
 
+    /// How the predictive controller did so far; `None` where the pursuit was chosen.
+    #[must_use]
+    pub fn solves(&self) -> Option<&Solves> {
+        self.predicting.as_ref().map(|controller| &controller.solves)
+    }
+
     /// Where the car was at the last state.
     #[must_use]
     pub fn place(&self) -> Option<Place> {
@@ -335,34 +348,22 @@ impl Driver {
         }
         self.watch(state);
         let Actuator { delay_s, lag_s, .. } = self.late();
-        let lead_s = lag_s.min(LEAD_S);
-        let (car, then) = if age_s + delay_s + lead_s > PROMPT_S {
-            let car =
-                predict(state, (age_s, delay_s, lag_s), lead_s, &self.asked, &self.vehicle, &self.plan.tires);
-            (car, self.track.place(car.x_m, car.y_m, Some(place.station_m)))
-        } else {
-            (*state, place)
-        };
         let moment = Moment {
-            car: &car,
-            place: then,
+            now: state,
+            place,
             track: &self.track,
-            table: &self.plan.table,
-            dt_s: self.asked.back().map_or(0.0, |a| from_s - a.from_s),
-            wheelbase_m: self.vehicle.wheelbase_m(),
-            l_f_m: self.vehicle.l_f_m,
+            plan: &self.plan,
+            vehicle: &self.vehicle,
+            asked: &self.asked,
+            age_s,
+            delay_s,
+            lag_s,
             assumed: self.is_assumed(),
+            speed_gain_1ps: self.settings.speed_gain_1ps,
         };
-        let most = self.vehicle.max_steering_rad;
-        let wanted_rad = self.settings.pursuit.steering_rad(&moment, &mut self.trim_rad).clamp(-most, most);
-        let angle_rad = if lag_s > PROMPT_S {
-            // Wheels that lag are asked for more, so that they are there in time.
-            let reached = 1.0 - (-lead_s / lag_s).exp();
-            let wheels = wheels_rad(&self.asked, from_s + delay_s, delay_s, lag_s).unwrap_or(wanted_rad);
-            (wheels + (wanted_rad - wheels) / reached).clamp(-most, most)
-        } else {
-            wanted_rad
-        };
+        let predicted = self.predicting.as_mut().and_then(|controller| controller.angle_rad(&moment).ok());
+        let pursued = || self.pursuing.angle_rad(&moment).unwrap_or(0.0);
+        let angle_rad = predicted.unwrap_or_else(pursued);
         let (speed_mps, acceleration_mps2) = self.longitudinal(state, place, angle_rad);
         let told = &self.plan.limits.told;
         let asked = Asked {

@@ -1,4 +1,4 @@
-//! Drives a car around a track on a tire set: speed profile, pursuit through a steering table, delay made up for.
+//! Drives a car around a track on a tire set: speed profile, pursuit or predictive control, delay made up for.
 //!
 //! A demonstration that closes the loop, not a racing stack: it follows a given line, and takes Phi_p as such stacks do. [`Driver`] is the
 //! interface: states in, commands out, tire sets whenever they come.
@@ -9,12 +9,14 @@ mod extended;
 mod governor;
 mod longitudinal;
 mod plan;
+mod predictive;
 mod probation;
 mod profile;
 mod progress;
 mod pursuit;
 mod spline;
 mod state;
+mod steering;
 mod tires;
 mod track;
 mod trial;
@@ -23,10 +25,12 @@ pub use driver::{Driver, Settings};
 pub use error::DrivingError;
 pub use extended::Named;
 pub use longitudinal::{Longitudinal, ReachedAt};
+pub use predictive::{Predictive, Solves};
 pub use probation::{Driven, GivenBack};
 pub use profile::{Drivetrain, Limits, SpeedProfile};
-pub use pursuit::{Moment, Pursuit};
+pub use pursuit::Pursuit;
 pub use state::{CarState, DriveCommand};
+pub use steering::Controller;
 pub use tires::{Actuator, SteeringTable, TireSet, Trust};
 pub use track::{Place, Track, TrackPoint};
 pub use trial::Trial;

@@ -3,6 +3,7 @@
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 
 use crate::Track;
+use crate::predictive::PathModel;
 use crate::profile::{Drivetrain, Limits, SpeedProfile};
 use crate::tires::{SteeringTable, with_peak};
 
@@ -20,6 +21,7 @@ pub(crate) struct Plan {
     pub(crate) limits: Limits,
     pub(crate) profile: SpeedProfile,
     pub(crate) table: SteeringTable,
+    pub(crate) model: PathModel,
 }
 
 impl Plan {
@@ -40,6 +42,7 @@ impl Plan {
         Self {
             profile: SpeedProfile::new(track, &limits),
             table: SteeringTable::new(vehicle, &tires),
+            model: PathModel::new(vehicle, &tires),
             tires,
             grip,
             limits,

@@ -8,8 +8,7 @@
 //! The second term damps: a steady-state table knows nothing of the yaw that is still to come. The third takes up what the tires do otherwise than the
 //! table says; it holds still near the limit, where more steering gives nothing, if the limit is known.
 
-use crate::state::CarState;
-use crate::{Place, SteeringTable, Track};
+use crate::steering::{Moment, NoAngle, PROMPT_S, Steering};
 
 /// Gain k of the yaw rate, over what the geometry of a rolling car gives.
 const YAW_GAIN: f64 = 1.5;
@@ -17,8 +16,8 @@ const YAW_GAIN: f64 = 1.5;
 const TRIM_S: f64 = 0.1;
 /// Share of the largest planned acceleration from which the trim does not grow.
 const TRIM_UP_TO: f64 = 0.9;
-/// Front slip over that of the largest planned force from which more only scrubs.
-const MOST_SLIP: f64 = 1.15;
+/// Time in which wheels that lag are brought where they are wanted.
+const LEAD_S: f64 = 0.06;
 
 /// How far pursuit looks ahead.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,51 +35,54 @@ impl Default for Pursuit {
     }
 }
 
-/// A moment of a drive, for whoever steers.
-#[derive(Debug, Clone, Copy)]
-pub struct Moment<'a> {
-    /// The car when the command will act.
-    pub car: &'a CarState,
-    /// Where it then is.
-    pub place: Place,
-    /// The line.
-    pub track: &'a Track,
-    /// The planned tires' steering table.
-    pub table: &'a SteeringTable,
-    /// Since the command before.
-    pub dt_s: f64,
-    /// Wheelbase.
-    pub wheelbase_m: f64,
-    /// Centre of gravity to front axle.
-    pub l_f_m: f64,
-    /// Nobody measured the tires: the table's limit is not the car's.
-    pub assumed: bool,
+/// Pursuit on a drive.
+#[derive(Debug, Clone)]
+pub(crate) struct Pursuing {
+    pursuit: Pursuit,
+    trim_rad: f64,
 }
 
-impl Pursuit {
-    /// The road-wheel angle; `trim_rad` goes on from command to command.
-    #[must_use]
-    pub fn steering_rad(&self, at: &Moment<'_>, trim_rad: &mut f64) -> f64 {
-        let car = at.car;
+impl Pursuing {
+    pub(crate) fn new(pursuit: Pursuit) -> Self {
+        Self { pursuit, trim_rad: 0.0 }
+    }
+
+    /// Where the wheels are to be, `lead_s` after the command begins to act.
+    fn wanted_rad(&mut self, at: &Moment<'_>, lead_s: f64) -> f64 {
+        let (car, place) = at.car(lead_s);
+        let table = &at.plan.table;
+        let wheelbase_m = at.vehicle.wheelbase_m();
         let speed = car.v_x_mps.hypot(car.v_y_mps).max(0.1);
-        let ahead_m = (self.ahead_s * speed).max(self.at_least_wheelbases * at.wheelbase_m);
-        let aim = at.track.at(at.place.station_m + ahead_m);
+        let ahead_m = (self.pursuit.ahead_s * speed).max(self.pursuit.at_least_wheelbases * wheelbase_m);
+        let aim = at.track.at(place.station_m + ahead_m);
         let (sin, cos) = car.course_rad().sin_cos();
         let (dx, dy) = (aim.x_m - car.x_m, aim.y_m - car.y_m);
         let away_sq = (dx * dx + dy * dy).max(1e-9);
         let wanted = 2.0 * speed * speed * (cos * dy - sin * dx) / away_sq;
-        let most = at.table.most_mps2();
+        let most = table.most_mps2();
         let a = wanted.clamp(-most, most);
         let late_radps = a / speed - car.yaw_rate_radps;
-        let late_rad = at.wheelbase_m / speed.max(1.0) * late_radps;
-        let grows = late_rad * *trim_rad > 0.0 && late_rad * a > 0.0;
+        let late_rad = wheelbase_m / speed.max(1.0) * late_radps;
+        let grows = late_rad * self.trim_rad > 0.0 && late_rad * a > 0.0;
         if at.assumed || wanted.abs() < TRIM_UP_TO * most || !grows {
-            *trim_rad += at.dt_s.clamp(0.0, 0.05) / TRIM_S * (late_rad - 0.2 * *trim_rad);
+            self.trim_rad += at.dt_s().clamp(0.0, 0.05) / TRIM_S * (late_rad - 0.2 * self.trim_rad);
         }
-        let angle = at.table.steering_rad(a, speed) + YAW_GAIN * late_rad + *trim_rad;
-        // More slip than that of the largest force only scrubs.
-        let front = (car.v_y_mps + at.l_f_m * car.yaw_rate_radps).atan2(car.v_x_mps.max(0.1));
-        let slip = MOST_SLIP * at.table.slips_rad(most).0;
-        angle.clamp(front - slip, front + slip)
+        let angle_rad = table.steering_rad(a, speed) + YAW_GAIN * late_rad + self.trim_rad;
+        at.within_slip(&car, angle_rad)
+    }
+}
+
+impl Steering for Pursuing {
+    fn angle_rad(&mut self, at: &Moment<'_>) -> Result<f64, NoAngle> {
+        let lead_s = at.lag_s.min(LEAD_S);
+        let most = at.vehicle.max_steering_rad;
+        let wanted_rad = self.wanted_rad(at, lead_s).clamp(-most, most);
+        if at.lag_s <= PROMPT_S {
+            return Ok(wanted_rad);
+        }
+        // Wheels that lag are asked for more, so that they are there in time.
+        let reached = 1.0 - (-lead_s / at.lag_s).exp();
+        let wheels = at.wheels_rad().unwrap_or(wanted_rad);
+        Ok((wheels + (wanted_rad - wheels) / reached).clamp(-most, most))
     }
 }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::time::Instant;
 
 use anyhow::Result;
-use gripsight_driving::TireSet;
+use gripsight_driving::{Controller, TireSet};
 use gripsight_reference_car::CarParameters;
 use gripsight_vehicle::PacejkaParameters;
 use rand::{RngExt, SeedableRng};
@@ -119,13 +119,13 @@ pub(crate) fn experiment(arguments: &Arguments) -> Result<String> {
         }
     }
     let rows = store.fill(work, arguments.verbose, |(car, track, seed, knows)| {
-        let plan = plan(&car, &track, seed, knows)?;
+        let plan = plan(&car, &track, seed, knows, arguments.controller)?;
         drive(&plan, arguments.verbose)
     })?;
     Ok(summary(&rows))
 }
 
-fn plan(car: &CarParameters, track: &str, seed: u64, knows: Knows) -> Result<Plan> {
+fn plan(car: &CarParameters, track: &str, seed: u64, knows: Knows, controller: Controller) -> Result<Plan> {
     let name = track.bytes().fold(0_u64, |sum, b| sum.wrapping_mul(31).wrapping_add(u64::from(b)));
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ name ^ 0x00f1_0075);
     let [dry, wet] = [DRY, WET].map(|(low, high)| parts(random.random_range(low..high), 1e2));
@@ -137,7 +137,7 @@ fn plan(car: &CarParameters, track: &str, seed: u64, knows: Knows) -> Result<Pla
         floors.push((mu, plant::projection(car, mu)?, random.random_range(0.05..0.95)));
     }
     let (mu, tires, _) = floors[0];
-    let case = Case { car: car.clone(), track: track.to_owned(), mu, seed, laps: FLOORS * LAPS, tires };
+    let case = Case { car: car.clone(), track: track.to_owned(), mu, seed, laps: FLOORS * LAPS, tires, controller };
     Ok(Plan { case, knows, floors })
 }
 

@@ -58,7 +58,7 @@ impl Loop {
             drivetrain.clone(),
             track.clone(),
             start,
-            Settings { share, ..Settings::default() },
+            Settings { share, controller: case.controller, ..Settings::default() },
         )?;
         let course = Course::Track { name: case.track.clone(), reversed };
         let mut scenario = plant::scenario(&case.car, course, case.mu, case.seed);

@@ -4,6 +4,7 @@
 //! the noisy telemetry, and only the referee the truth.
 
 mod changes;
+mod controllers;
 mod drive;
 mod effects;
 mod learner;
@@ -18,6 +19,7 @@ use std::path::PathBuf;
 
 use anyhow::{Result, ensure};
 use clap::{Parser, ValueEnum};
+use gripsight_driving::Controller;
 use gripsight_reference_car::CarParameters;
 use run::{Case, Variant, drive};
 use store::Store;
@@ -33,6 +35,8 @@ enum Experiment {
     Picture,
     /// The car has an effect that the controller's model lacks, on the true tires of the car without it: effects.csv
     Effects,
+    /// The pursuit and the predictive controller beside each other, on the true tires: controllers.csv
+    Controllers,
 }
 
 /// Drives the reference car from mu = 0.51 on roads that it does not know, with and without identification.
@@ -71,6 +75,9 @@ struct Arguments {
     /// Laps of a run, for laps
     #[arg(long, default_value_t = 5)]
     laps: usize,
+    /// Who steers: pursuit or mpc; a folder holds the runs of one
+    #[arg(long, default_value = "pursuit")]
+    controller: Controller,
     /// Says on standard error what happens in each run; one after the other
     #[arg(long)]
     verbose: bool,
@@ -115,6 +122,7 @@ fn main() -> Result<()> {
             return Ok(());
         }
         Experiment::Effects => effects::experiment(&arguments)?,
+        Experiment::Controllers => controllers::experiment(&arguments)?,
     };
     std::fs::write(arguments.out.join("summary.md"), &summary)?;
     print!("{summary}");
@@ -135,7 +143,8 @@ fn laps(arguments: &Arguments) -> Result<String> {
             for track in &arguments.tracks {
                 for seed in arguments.seeds() {
                     let (car, track, laps) = (car.clone(), track.clone(), arguments.laps);
-                    let case = Case { car, track, mu, seed, laps, tires };
+                    let controller = arguments.controller;
+                    let case = Case { car, track, mu, seed, laps, tires, controller };
                     let asked = Variant::ALL.into_iter().filter(|v| arguments.asks_for(v.name()));
                     work.extend(asked.map(|variant| (case.clone(), variant)));
                 }

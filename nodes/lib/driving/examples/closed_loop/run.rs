@@ -1,7 +1,7 @@
 //! One run: a car on a road that it does not know, some laps.
 
 use anyhow::Result;
-use gripsight_driving::TireSet;
+use gripsight_driving::{Controller, TireSet};
 use gripsight_identification::FrictionPrior;
 use gripsight_reference_car::CarParameters;
 use gripsight_vehicle::PacejkaParameters;
@@ -72,6 +72,8 @@ pub(crate) struct Case {
     pub(crate) laps: usize,
     /// The plant's tires.
     pub(crate) tires: PacejkaParameters,
+    /// Who steers.
+    pub(crate) controller: Controller,
 }
 
 /// What a run gave.
