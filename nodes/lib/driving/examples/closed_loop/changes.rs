@@ -137,7 +137,8 @@ fn plan(car: &CarParameters, track: &str, seed: u64, knows: Knows, controller: C
         floors.push((mu, plant::projection(car, mu)?, random.random_range(0.05..0.95)));
     }
     let (mu, tires, _) = floors[0];
-    let case = Case { car: car.clone(), track: track.to_owned(), mu, seed, laps: FLOORS * LAPS, tires, controller };
+    let case =
+        Case { car: car.clone(), track: track.to_owned(), mu, seed, laps: FLOORS * LAPS, tires, controller };
     Ok(Plan { case, knows, floors })
 }
 

@@ -7,7 +7,7 @@ use gripsight_driving::Controller;
 use gripsight_reference_car::CarParameters;
 use serde::{Deserialize, Serialize};
 
-use crate::drive::{Loop, truth};
+use crate::drive::{Loop, processor_s, truth};
 use crate::run::Case;
 use crate::store::{Store, mean, parts};
 use crate::{Arguments, plant};
@@ -31,15 +31,15 @@ struct Row {
     /// In all laps.
     exits: u32,
     wreck: String,
-    /// Commands of the controller asked for, of the pursuit in its place, and because the car was too slow.
     commands: u64,
+    /// Commands that the pursuit gave in the place of the predictive controller: no convergence, too slow a car.
     not_converged: u64,
     slow: u64,
-    /// Of a command of the predictive controller.
+    /// The solver's, a command.
     iterations: f64,
-    mean_us: f64,
-    longest_us: f64,
-    /// Simulated time over the time that the whole run took.
+    /// The processor's time for a command, state to command.
+    command_us: f64,
+    /// Simulated time over the processor's time for the whole run.
     times_real_time: f64,
 }
 
@@ -70,13 +70,13 @@ pub(crate) fn experiment(arguments: &Arguments) -> Result<String> {
                     == (car, track, case.mu, case.seed, name)
             })
     });
-    let rows =
-        store.fill(work, arguments.verbose, |(case, name)| Ok(vec![drive(&case, name, arguments.verbose)?]))?;
+    let rows = store
+        .fill(work, arguments.verbose, |(case, name)| Ok(vec![drive(&case, name, arguments.verbose)?]))?;
     Ok(summary(&rows))
 }
 
 fn drive(case: &Case, name: &str, verbose: bool) -> Result<Row> {
-    let begin = std::time::Instant::now();
+    let begin_s = processor_s();
     let mut run = Loop::new(case, truth(case.tires), verbose)?;
     run.driver.take_longitudinal(plant::told(&case.car, case.mu));
     let longest_s = 4.0 * case.laps as f64 * run.referee.fastest_lap_s();
@@ -89,7 +89,6 @@ fn drive(case: &Case, name: &str, verbose: bool) -> Result<Row> {
     }
     let solves = run.driver.solves().copied().unwrap_or_default();
     let later = || run.referee.laps.iter().skip(1);
-    let each = solves.solved.max(1) as f64;
     Ok(Row {
         car: case.car.name.clone(),
         track: case.track.clone(),
@@ -104,20 +103,19 @@ fn drive(case: &Case, name: &str, verbose: bool) -> Result<Row> {
         used: parts(mean(later().map(|lap| lap.used)), 1e4),
         exits: run.referee.exits(),
         wreck: wreck.unwrap_or("").to_owned(),
-        commands: solves.solved,
+        commands: run.commands,
         not_converged: solves.not_converged,
         slow: solves.slow,
-        iterations: parts(solves.iterations as f64 / each, 1e1),
-        mean_us: parts(1e6 * solves.total_s / each, 1e1),
-        longest_us: parts(1e6 * solves.longest_s, 1e1),
-        times_real_time: parts(run.sim.time_s() / begin.elapsed().as_secs_f64(), 1e1),
+        iterations: parts(solves.iterations as f64 / solves.solved.max(1) as f64, 1e1),
+        command_us: parts(1e6 * run.commands_s / run.commands.max(1) as f64, 1e1),
+        times_real_time: parts(run.sim.time_s() / (processor_s() - begin_s), 1e1),
     })
 }
 
 /// A row for each car, road and controller.
 fn summary(rows: &[Row]) -> String {
     let mut text = String::from(
-        "| car | mu | controller | runs | lap (s) | error mean (m) | worst (m) | edge (m) | grip used | exits | wrecks | commands | not converged | iterations | a command (us) | longest (us) | times real time |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+        "| car | mu | controller | runs | lap (s) | error mean (m) | worst (m) | edge (m) | grip used | exits | wrecks | commands | not converged | iterations | a command (us) | times real time |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     let mut groups: Vec<(&str, f64)> = rows.iter().map(|r| (r.car.as_str(), r.mu)).collect();
     groups.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
@@ -131,7 +129,7 @@ fn summary(rows: &[Row]) -> String {
             let longest = |figure: fn(&Row) -> f64| of().map(figure).fold(0.0, f64::max);
             let _ = writeln!(
                 text,
-                "| {car} | {mu} | {name} | {} | {:.2} | {:.3} | {:.3} | {:.2} | {:.1} % | {} | {} | {} | {} | {:.1} | {:.0} | {:.0} | {:.0} |",
+                "| {car} | {mu} | {name} | {} | {:.2} | {:.3} | {:.3} | {:.2} | {:.1} % | {} | {} | {} | {} | {:.1} | {:.0} | {:.0} |",
                 of().count(),
                 mean(of().map(|r| r.time_s)),
                 mean(of().map(|r| r.error_m)),
@@ -143,8 +141,7 @@ fn summary(rows: &[Row]) -> String {
                 of().map(|r| r.commands).sum::<u64>(),
                 of().map(|r| r.not_converged).sum::<u64>(),
                 mean(of().map(|r| r.iterations)),
-                mean(of().map(|r| r.mean_us)),
-                longest(|r| r.longest_us),
+                mean(of().map(|r| r.command_us)),
                 mean(of().map(|r| r.times_real_time)),
             );
         }

@@ -23,6 +23,9 @@ pub(crate) struct Loop {
     /// Telemetry to diagnose from.
     pub(crate) recent: Option<Recent>,
     pub(crate) vehicle: VehicleParameters,
+    /// Commands given, and the processor's time that they took.
+    pub(crate) commands: u64,
+    pub(crate) commands_s: f64,
     drivetrain: Drivetrain,
     steps: u64,
     halves: usize,
@@ -32,6 +35,12 @@ pub(crate) struct Loop {
 /// A set that the plant itself stands for.
 pub(crate) fn truth(tires: PacejkaParameters) -> TireSet {
     TireSet { trust: Trust::Accepted, ..TireSet::assumed(tires) }
+}
+
+/// The processor's time that this thread has taken: other programs do not count.
+pub(crate) fn processor_s() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
 impl Loop {
@@ -73,6 +82,8 @@ impl Loop {
             learner: None,
             recent: None,
             vehicle,
+            commands: 0,
+            commands_s: 0.0,
             drivetrain,
             steps: 0,
             halves: 0,
@@ -111,7 +122,10 @@ impl Loop {
                         v_y_mps: s.v_y_mps,
                         yaw_rate_radps: s.yaw_rate_radps,
                     };
+                    let begin_s = processor_s();
                     let command = self.driver.command(&state, s.stamp_s);
+                    self.commands_s += processor_s() - begin_s;
+                    self.commands += 1;
                     self.sim.command(Command {
                         steering_rad: command.steering_rad,
                         speed_mps: command.speed_mps,

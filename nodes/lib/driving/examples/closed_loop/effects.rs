@@ -138,8 +138,15 @@ pub(crate) fn experiment(arguments: &Arguments) -> Result<String> {
             let tires = plant::projection(&car, mu)?;
             for seed in arguments.seeds() {
                 for track in &arguments.tracks {
-                    let case =
-                        Case { car: car.clone(), track: track.clone(), mu, seed, laps: COUNT + 2, tires, controller: arguments.controller };
+                    let case = Case {
+                        car: car.clone(),
+                        track: track.clone(),
+                        mu,
+                        seed,
+                        laps: COUNT + 2,
+                        tires,
+                        controller: arguments.controller,
+                    };
                     for wrong in Wrong::ALL {
                         work.extend(Knows::ALL.map(|knows| (case.clone(), wrong, knows)));
                     }

@@ -38,7 +38,15 @@ pub(crate) fn experiment(arguments: &Arguments) -> Result<String> {
     let mu = *arguments.frictions.first().context("no friction")?;
     let track = arguments.tracks.first().context("no track")?.clone();
     let tires = plant::projection(&car, mu)?;
-    let case = Case { car, track, mu, seed: arguments.from_seed, laps: LAPS, tires, controller: arguments.controller };
+    let case = Case {
+        car,
+        track,
+        mu,
+        seed: arguments.from_seed,
+        laps: LAPS,
+        tires,
+        controller: arguments.controller,
+    };
     let mut run = Loop::new(&case, TireSet::start(), arguments.verbose)?;
     run.learner = Some(Learner::new(run.vehicle.clone(), Variant::NoPrior.prior(mu, case.seed)));
     let grip = truth(tires).grip();

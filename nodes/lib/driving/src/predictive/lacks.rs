@@ -43,10 +43,8 @@ impl Lacks {
         let [first, last] = [(from.v_x_mps, from_wheels_rad), (now.v_x_mps, wheels_rad)]
             .map(|(v_x_mps, steering_rad)| Input { v_x_mps, steering_rad });
         let expected = model.step(start, &first, &last, dt_s, SUBSTEP_S);
-        let seen = [
-            (now.v_y_mps - expected.v_y_mps) / dt_s,
-            (now.yaw_rate_radps - expected.yaw_rate_radps) / dt_s,
-        ];
+        let seen =
+            [(now.v_y_mps - expected.v_y_mps) / dt_s, (now.yaw_rate_radps - expected.yaw_rate_radps) / dt_s];
         let most_mps2 = MOST * at.plan.table.most_mps2();
         let arm_1pm = at.vehicle.mass_kg * at.vehicle.l_f_m / at.vehicle.yaw_inertia_kgm2;
         for (lane, most) in [most_mps2, most_mps2 * arm_1pm].into_iter().enumerate() {

@@ -8,8 +8,6 @@ mod lacks;
 mod model;
 mod problem;
 
-use std::time::Instant;
-
 use self::lacks::Lacks;
 pub(crate) use self::model::PathModel;
 use self::model::{Along, Motion};
@@ -68,10 +66,6 @@ pub struct Solves {
     pub slow: u64,
     /// Iterations of the solver, altogether.
     pub iterations: u64,
-    /// Time spent on what it gave, altogether.
-    pub total_s: f64,
-    /// Time spent on the longest command.
-    pub longest_s: f64,
 }
 
 /// The controller on a drive.
@@ -87,7 +81,13 @@ pub(crate) struct Predicting {
 
 impl Predicting {
     pub(crate) fn new(style: Predictive) -> Self {
-        Self { style, lacks: Lacks::default(), solver: Solver::default(), last: None, solves: Solves::default() }
+        Self {
+            style,
+            lacks: Lacks::default(),
+            solver: Solver::default(),
+            last: None,
+            solves: Solves::default(),
+        }
     }
 
     fn solve(&mut self, at: &Moment<'_>) -> Result<f64, NoAngle> {
@@ -120,9 +120,14 @@ impl Predicting {
                 course_rad: self.style.course_rad,
                 rate_radps: self.style.rate_radps,
                 outside_m: 0.05 * wheelbase_m,
+                slip_rad: 0.01,
                 end: self.style.end,
             },
-            hard: Hard { angle_rad: at.vehicle.max_steering_rad, rate_radps: self.style.most_rate_radps },
+            hard: Hard {
+                angle_rad: at.vehicle.max_steering_rad,
+                rate_radps: self.style.most_rate_radps,
+                slip_rad: at.plan.model.most_slip_rad(),
+            },
         };
         self.last = None;
         let Solution { motion, commands_rad, iterations } =
@@ -152,7 +157,9 @@ impl Predicting {
             let ahead_s = k as f64 * STEP_S;
             let near = match k {
                 0 => start,
-                _ => self.last_at(acts_s + ahead_s).unwrap_or_else(|| steady(at, point.curvature_1pm, v_x_mps)),
+                _ => {
+                    self.last_at(acts_s + ahead_s).unwrap_or_else(|| steady(at, point.curvature_1pm, v_x_mps))
+                }
             };
             let fades = (-ahead_s / LACKS_S).exp();
             let along = Along { point, v_x_mps };
@@ -198,19 +205,13 @@ fn steady(at: &Moment<'_>, curvature_1pm: f64, v_x_mps: f64) -> Motion {
 
 impl Steering for Predicting {
     fn angle_rad(&mut self, at: &Moment<'_>) -> Result<f64, NoAngle> {
-        let begin = Instant::now();
         let angle = self.solve(at);
-        let spent_s = begin.elapsed().as_secs_f64();
-        let solves = &mut self.solves;
-        match angle {
-            Ok(_) => {
-                solves.solved += 1;
-                solves.total_s += spent_s;
-                solves.longest_s = solves.longest_s.max(spent_s);
-            }
-            Err(NoAngle::NotConverged) => solves.not_converged += 1,
-            Err(NoAngle::Slow) => solves.slow += 1,
-        }
+        let count = match angle {
+            Ok(_) => &mut self.solves.solved,
+            Err(NoAngle::NotConverged) => &mut self.solves.not_converged,
+            Err(NoAngle::Slow) => &mut self.solves.slow,
+        };
+        *count += 1;
         angle
     }
 }

@@ -6,12 +6,15 @@
 //! p'   = w - k (v_x cos p - v_y sin p)/(1 - k e)   k: curvature of the line
 //! v_y' = (F_f cos d + F_r)/m - v_x w + d_y         d_y, d_w: what the model lacks, as the last tenths of a second showed it
 //! w'   = (l_f F_f cos d - l_r F_r)/I_z + d_w
-//! F_i  = F_zi (n_i(a) + n_i'(a) (alpha_i - a))     a: the slip predicted for axle i, at most a share of that of the peak
+//! F_i  = F_zi (n_i(a) + n_i'(a) (alpha_i - a))     a: the slip predicted for axle i, as far as n_i' is a tenth of that at zero
 //! ```
 //!
-//! The tangent is taken below the peak: on a falling branch a linear model would steer the other way.
+//! The tangent is taken below the peak: on its flat top a linear model knows of no way back, on a falling branch it would steer the other way.
+//! The slip at which the last tangent reaches the peak's force is therefore the most that has a use.
 
-use gripsight_vehicle::{Dual, Input, MagicFormula, PacejkaParameters, Real, SingleTrack, State, VehicleParameters};
+use gripsight_vehicle::{
+    Dual, Input, MagicFormula, PacejkaParameters, Real, SingleTrack, State, VehicleParameters,
+};
 
 use crate::TrackPoint;
 
@@ -19,10 +22,12 @@ use crate::TrackPoint;
 pub(crate) const STATES: usize = 5;
 /// Of them, those with a differential equation of the car: the wheels follow their command.
 pub(crate) const MOVES: usize = 4;
-/// Share of the peak's slip up to which tangents are taken.
-const TANGENT_UP_TO: f64 = 0.9;
-/// Slip of the peak of tires without one.
-const NO_PEAK_RAD: f64 = 0.5;
+/// Slope over that at zero from which tangents are taken.
+const STEEP: f64 = 0.1;
+/// Largest slip of tires that stay steep.
+const END_RAD: f64 = 0.5;
+/// Step in which a curve is looked through.
+const LOOK_RAD: f64 = 0.002;
 
 /// Offset, heading against the line, lateral velocity, yaw rate, wheels' angle.
 pub(crate) type Motion = [f64; STATES];
@@ -39,6 +44,9 @@ pub(crate) struct Along {
 pub(crate) struct Linear {
     pub(crate) jacobian: [[f64; STATES]; MOVES],
     pub(crate) rest: [f64; MOVES],
+    /// Slip of the front wheels near it: `slip x + slip_rest`.
+    pub(crate) slip: [f64; STATES],
+    pub(crate) slip_rest_rad: f64,
 }
 
 /// The car on its planned tires.
@@ -57,25 +65,36 @@ pub(crate) struct PathModel {
 struct Axle {
     tire: MagicFormula,
     load_n: f64,
-    most_slip_rad: f64,
+    /// Slip up to which tangents are taken, and the one at which the last tangent reaches the peak's force.
+    tangent_rad: f64,
+    most_rad: f64,
 }
 
 impl Axle {
     fn new(tire: MagicFormula, load_n: f64) -> Self {
-        let peak_rad = tire.peak_slip_rad().unwrap_or(NO_PEAK_RAD);
-        Self { tire, load_n, most_slip_rad: TANGENT_UP_TO * peak_rad }
+        let steep = STEEP * tire.normalized_stiffness();
+        let slips = || (1..=(END_RAD / LOOK_RAD) as u32).map(|k| f64::from(k) * LOOK_RAD);
+        let tangent_rad =
+            slips().take_while(|slip| tangent(&tire, *slip).1 > steep).last().unwrap_or(LOOK_RAD);
+        let (force, slope) = tangent(&tire, tangent_rad);
+        let left = (tire.max_force_within(END_RAD) - force).max(0.0);
+        Self { tire, load_n, tangent_rad, most_rad: (tangent_rad + left / slope.max(steep)).min(END_RAD) }
     }
 
     fn force_n(&self, slip_rad: Dual<STATES>) -> Dual<STATES> {
-        let near_rad = slip_rad.re().clamp(-self.most_slip_rad, self.most_slip_rad);
-        let fixed = |v: f64| Dual::<1>::from(v);
-        let MagicFormula { b, c, d, e } = self.tire;
-        let tire = MagicFormula { b: fixed(b), c: fixed(c), d: fixed(d), e: fixed(e) };
-        let force = tire.normalized_force(Dual::variable(near_rad, 0));
-        let slope = force.derivatives()[0];
-        let value = force.re() + slope * (slip_rad.re() - near_rad);
+        let near_rad = slip_rad.re().clamp(-self.tangent_rad, self.tangent_rad);
+        let (force, slope) = tangent(&self.tire, near_rad);
+        let value = force + slope * (slip_rad.re() - near_rad);
         Dual::chain(self.load_n * value, [(self.load_n * slope, &slip_rad)])
     }
+}
+
+/// Normalised force and its slope at a slip.
+fn tangent(tire: &MagicFormula, slip_rad: f64) -> (f64, f64) {
+    let fixed = |v: f64| Dual::<1>::from(v);
+    let tire = MagicFormula { b: fixed(tire.b), c: fixed(tire.c), d: fixed(tire.d), e: fixed(tire.e) };
+    let force = tire.normalized_force(Dual::variable(slip_rad, 0));
+    (force.re(), force.derivatives()[0])
 }
 
 impl PathModel {
@@ -96,6 +115,11 @@ impl PathModel {
             l_f_m: vehicle.l_f_m,
             l_r_m: vehicle.l_r_m,
         }
+    }
+
+    /// Slip of the front wheels beyond which more gives nothing.
+    pub(crate) fn most_slip_rad(&self) -> f64 {
+        self.front.most_rad
     }
 
     /// The tangent at a motion; `lacks`: d_y and d_w.
@@ -122,7 +146,9 @@ impl PathModel {
             let moved: f64 = jacobian[row].iter().zip(near).map(|(slope, x)| slope * x).sum();
             rates[row].re() - moved
         });
-        Linear { jacobian, rest }
+        let slip = *slips.0.derivatives();
+        let slipped: f64 = slip.iter().zip(near).map(|(slope, x)| slope * x).sum();
+        Linear { jacobian, rest, slip, slip_rest_rad: slips.0.re() - slipped }
     }
 }
 
@@ -137,7 +163,8 @@ mod tests {
     }
 
     fn along(curvature_1pm: f64) -> Along {
-        let point = TrackPoint { x_m: 0.0, y_m: 0.0, heading_rad: 0.0, curvature_1pm, right_m: 1.0, left_m: 1.0 };
+        let point =
+            TrackPoint { x_m: 0.0, y_m: 0.0, heading_rad: 0.0, curvature_1pm, right_m: 1.0, left_m: 1.0 };
         Along { point, v_x_mps: 4.0 }
     }
 

@@ -6,6 +6,7 @@
 //!       d_k = (1 - f) d_{k-1} + (f - g) c_{k-1} + g c_k           wheels d that follow a command c with a lag T: f = 1 - exp(-dt/T), g = 1 - f T/dt
 //!       |c_k| <= c_max,  |c_k - c_{k-1}| <= rate dt               hard
 //!       -right_k - S s_k <= e_k <= left_k + S s_k,  s_k >= 0      the track's edges: soft, so that there is always an answer
+//!       |alpha_f,k| <= alpha_max + A s_k                          no more slip at the front wheels than has a use: soft, too
 //! ```
 
 use clarabel::algebra::CscMatrix;
@@ -17,10 +18,13 @@ use super::model::{Linear, MOVES, Motion, STATES};
 const UNKNOWNS: usize = STATES + 2;
 const COMMAND: usize = STATES;
 const OUTSIDE: usize = STATES + 1;
+/// Of the motion, what the front wheels' slip depends on.
+const SLIPS: std::ops::Range<usize> = 2..STATES;
 /// Inequalities of an instant.
-const BOUNDS: usize = 7;
+const BOUNDS: usize = 9;
 /// Accuracy: a hundred times finer than the servo's resolution.
 const TOLERANCE: f64 = 1e-5;
+const REFINED: f64 = 1e-8;
 /// Iterations at most: twice what a hard corner takes.
 const ITERATIONS: u32 = 30;
 
@@ -35,6 +39,8 @@ pub(crate) struct Scales {
     pub(crate) rate_radps: f64,
     /// Distance S outside of the edge.
     pub(crate) outside_m: f64,
+    /// Slip A beyond the largest that has a use, which weighs as much.
+    pub(crate) slip_rad: f64,
     /// Weight of the last instant over the others.
     pub(crate) end: f64,
 }
@@ -44,6 +50,8 @@ pub(crate) struct Scales {
 pub(crate) struct Hard {
     pub(crate) angle_rad: f64,
     pub(crate) rate_radps: f64,
+    /// Slip of the front wheels that has a use: not quite as hard.
+    pub(crate) slip_rad: f64,
 }
 
 /// An instant of the horizon.
@@ -132,8 +140,10 @@ impl Solver {
                 solver
             }
             None => {
-                let cones =
-                    [SupportedConeT::ZeroConeT(STATES * steps), SupportedConeT::NonnegativeConeT(BOUNDS * steps)];
+                let cones = [
+                    SupportedConeT::ZeroConeT(STATES * steps),
+                    SupportedConeT::NonnegativeConeT(BOUNDS * steps),
+                ];
                 DefaultSolver::new(&p, &q, &a, &b, &cones, settings()).ok()?
             }
         };
@@ -160,6 +170,9 @@ fn settings() -> DefaultSettings<f64> {
         tol_feas: TOLERANCE,
         // Data are exchanged from step to step: nothing may be left out of the first.
         presolve_enable: false,
+        // The factors are as accurate as the tolerance needs; more refinement doubles the time.
+        iterative_refinement_reltol: REFINED,
+        iterative_refinement_abstol: REFINED,
         input_sparse_dropzeros: false,
         ..DefaultSettings::default()
     }
@@ -237,9 +250,10 @@ impl Problem<'_> {
     }
 
     fn bounds(&self, k: usize, first: usize, a: &mut Entries, b: &mut [f64]) {
-        let Hard { angle_rad, rate_radps } = self.hard;
+        let Hard { angle_rad, rate_radps, slip_rad } = self.hard;
+        let linear = &self.stages[k].linear;
         for (side, sign) in [-1.0, 1.0].into_iter().enumerate() {
-            let [turn, angle, edge] = [0, 2, 4].map(|row| first + row + side);
+            let [turn, angle, edge, slip] = [0, 2, 4, 6].map(|row| first + row + side);
             a.put(turn, at(k, COMMAND), sign);
             b[turn] = rate_radps * self.step_s;
             if k > 1 {
@@ -252,7 +266,12 @@ impl Problem<'_> {
             a.put(edge, at(k, 0), sign);
             a.put(edge, at(k, OUTSIDE), -self.scales.outside_m);
             b[edge] = self.stages[k].room_m[side];
+            for lane in SLIPS {
+                a.put(slip, at(k, lane), sign * linear.slip[lane]);
+            }
+            a.put(slip, at(k, OUTSIDE), -self.scales.slip_rad);
+            b[slip] = slip_rad - sign * linear.slip_rest_rad;
         }
-        a.put(first + 6, at(k, OUTSIDE), -1.0);
+        a.put(first + 8, at(k, OUTSIDE), -1.0);
     }
 }
