@@ -49,7 +49,7 @@ impl Pursuing {
 
     /// Where the wheels are to be, `lead_s` after the command begins to act.
     fn wanted_rad(&mut self, at: &Moment<'_>, lead_s: f64) -> f64 {
-        let (car, place) = at.car(lead_s);
+        let (car, place) = at.car(lead_s, [0.0; 2]);
         let table = &at.plan.table;
         let wheelbase_m = at.vehicle.wheelbase_m();
         let speed = car.v_x_mps.hypot(car.v_y_mps).max(0.1);

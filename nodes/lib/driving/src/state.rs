@@ -76,11 +76,13 @@ pub(crate) fn wheels_rad(asked: &VecDeque<Asked>, time_s: f64, delay_s: f64, lag
     Some(wheels)
 }
 
-/// The car `age_s + delay_s + lead_s` later, by the single-track model with the commands that are still on their way.
+/// The car `age_s + delay_s + lead_s` later, by the single-track model with the commands that are still on their way. `lacks`: accelerations of v_y and of
+/// the yaw rate beyond the model's.
 pub(crate) fn predict(
     now: &CarState,
     (age_s, delay_s, lag_s): (f64, f64, f64),
     lead_s: f64,
+    lacks: [f64; 2],
     asked: &VecDeque<Asked>,
     vehicle: &VehicleParameters,
     tires: &PacejkaParameters,
@@ -100,7 +102,9 @@ pub(crate) fn predict(
         let angle_rad = wheels_rad(asked, at.stamp_s, delay_s, lag_s).unwrap_or(0.0);
         let input = Input { v_x_mps: at.v_x_mps, steering_rad: angle_rad };
         let from = State { v_y_mps: at.v_y_mps, yaw_rate_radps: at.yaw_rate_radps };
-        let to = car.step(from, &input, &input, dt_s, SUBSTEP_S);
+        let mut to = car.step(from, &input, &input, dt_s, SUBSTEP_S);
+        to.v_y_mps += dt_s * lacks[0];
+        to.yaw_rate_radps += dt_s * lacks[1];
         let v_y = 0.5 * (from.v_y_mps + to.v_y_mps);
         let heading = at.heading_rad + 0.25 * dt_s * (from.yaw_rate_radps + to.yaw_rate_radps);
         let (sin, cos) = heading.sin_cos();

@@ -88,13 +88,14 @@ impl Moment<'_> {
         self.asked.back().map_or(0.0, |last| self.from_s() - last.from_s)
     }
 
-    /// The car `lead_s` after the command begins to act, with what was asked before.
-    pub(crate) fn car(&self, lead_s: f64) -> (CarState, Place) {
+    /// The car `lead_s` after the command begins to act, with what was asked before. `lacks`: accelerations of v_y and of the yaw rate that the model
+    /// does not have.
+    pub(crate) fn car(&self, lead_s: f64, lacks: [f64; 2]) -> (CarState, Place) {
         if self.age_s + self.delay_s + lead_s <= PROMPT_S {
             return (*self.now, self.place);
         }
         let late = (self.age_s, self.delay_s, self.lag_s);
-        let car = predict(self.now, late, lead_s, self.asked, self.vehicle, &self.plan.tires);
+        let car = predict(self.now, late, lead_s, lacks, self.asked, self.vehicle, &self.plan.tires);
         (car, self.track.place(car.x_m, car.y_m, Some(self.place.station_m)))
     }
 

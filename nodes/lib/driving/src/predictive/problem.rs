@@ -23,7 +23,7 @@ const SLIPS: std::ops::Range<usize> = 2..STATES;
 /// Inequalities of an instant.
 const BOUNDS: usize = 9;
 /// Accuracy: a hundred times finer than the servo's resolution.
-const TOLERANCE: f64 = 1e-5;
+const TOLERANCE: f64 = 1e-4;
 const REFINED: f64 = 1e-8;
 /// Iterations at most: twice what a hard corner takes.
 const ITERATIONS: u32 = 30;

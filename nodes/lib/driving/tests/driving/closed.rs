@@ -6,7 +6,7 @@ use gripsight_driving::{
 };
 use gripsight_vehicle::{Input, MagicFormula, PacejkaParameters, SingleTrack, State, VehicleParameters};
 
-const DRIVETRAIN: Drivetrain = Drivetrain {
+pub(super) const DRIVETRAIN: Drivetrain = Drivetrain {
     drive_mps2: 6.0,
     brake_mps2: 8.0,
     power_w_per_kg: 60.0,
@@ -24,16 +24,16 @@ fn track() -> Track {
     Track::from_points(&(0..120).map(row).collect::<Vec<_>>()).unwrap()
 }
 
-fn tires(grip: f64) -> PacejkaParameters {
+pub(super) fn tires(grip: f64) -> PacejkaParameters {
     let axle = |k: f64| MagicFormula::from_stiffness(k, 1.5, grip, 0.0);
     PacejkaParameters { front: axle(9.0), rear: axle(10.5) }
 }
 
-fn set(grip: f64, trust: Trust) -> TireSet {
+pub(super) fn set(grip: f64, trust: Trust) -> TireSet {
     TireSet { trust, ..TireSet::assumed(tires(grip)) }
 }
 
-fn rear_driven() -> VehicleParameters {
+pub(super) fn rear_driven() -> VehicleParameters {
     VehicleParameters {
         drive_front_share: Some(0.0),
         brake_front_share: Some(0.6),
@@ -42,32 +42,46 @@ fn rear_driven() -> VehicleParameters {
 }
 
 fn driver(start: TireSet) -> Driver {
-    Driver::new(rear_driven(), DRIVETRAIN, track(), start, Settings::default()).unwrap()
+    with(start, Settings::default())
+}
+
+pub(super) fn with(start: TireSet, settings: Settings) -> Driver {
+    Driver::new(rear_driven(), DRIVETRAIN, track(), start, settings).unwrap()
+}
+
+/// A car that goes along the line.
+pub(super) fn on_the_line(driver: &Driver, station_m: f64, v_x_mps: f64) -> CarState {
+    let at = driver.track().at(station_m);
+    CarState {
+        stamp_s: 0.0,
+        x_m: at.x_m,
+        y_m: at.y_m,
+        heading_rad: at.heading_rad,
+        v_x_mps,
+        v_y_mps: 0.0,
+        yaw_rate_radps: 0.0,
+    }
 }
 
 /// Drives `duration_s` on tires of a grip, the steering late by `delay_s`; the largest distance to the line after 3 s.
-fn drive(driver: &mut Driver, grip: impl Fn(f64) -> f64, delay_s: f64, duration_s: f64) -> f64 {
+pub(super) fn drive(driver: &mut Driver, grip: impl Fn(f64) -> f64, delay_s: f64, duration_s: f64) -> f64 {
     drive_with(driver, grip, &Named { steering_delay_s: Some(delay_s), ..Named::default() }, duration_s)
 }
 
 /// The same on a car with some effects.
-fn drive_with(driver: &mut Driver, grip: impl Fn(f64) -> f64, effects: &Named, duration_s: f64) -> f64 {
+pub(super) fn drive_with(
+    driver: &mut Driver,
+    grip: impl Fn(f64) -> f64,
+    effects: &Named,
+    duration_s: f64,
+) -> f64 {
     const DT_S: f64 = 0.01;
     let delay_s = effects.steering_delay_s.unwrap_or(0.0);
     let follows = 1.0 - (-DT_S / effects.steering_lag_s.unwrap_or(0.0).max(1e-9)).exp();
     let arm_m = effects.v_y_lever_arm_m.unwrap_or(0.0);
     let mut wheels_rad = 0.0;
     let vehicle = rear_driven();
-    let at = driver.track().at(0.0);
-    let mut car = CarState {
-        stamp_s: 0.0,
-        x_m: at.x_m,
-        y_m: at.y_m,
-        heading_rad: at.heading_rad,
-        v_x_mps: 2.0,
-        v_y_mps: 0.0,
-        yaw_rate_radps: 0.0,
-    };
+    let mut car = on_the_line(driver, 0.0, 2.0);
     let late = (delay_s / DT_S).round() as usize;
     let mut commands = vec![DriveCommand::default(); late];
     let mut worst_m = 0.0_f64;
@@ -176,16 +190,8 @@ fn a_drive_train_that_gives_less_is_asked_for_more() {
         let mut places = (0..600).map(|k| f64::from(k) * 0.1);
         let gentle = if gains { 0.1..1.5 } else { -1.5..-0.5 };
         let station_m = places.find(|s| gentle.contains(&slope(s))).unwrap();
-        let (at, (v_x_mps, _)) = (driver.track().at(station_m), driver.profile().at(station_m));
-        let car = CarState {
-            stamp_s: 0.0,
-            x_m: at.x_m,
-            y_m: at.y_m,
-            heading_rad: at.heading_rad,
-            v_x_mps,
-            v_y_mps: 0.0,
-            yaw_rate_radps: 0.0,
-        };
+        let v_x_mps = driver.profile().at(station_m).0;
+        let car = on_the_line(&driver, station_m, v_x_mps);
         (driver.command(&car, 0.0).acceleration_mps2, v_x_mps)
     };
     let (braked, _) = asked(None, false);

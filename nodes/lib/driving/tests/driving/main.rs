@@ -3,5 +3,6 @@
 #![allow(clippy::unwrap_used)]
 
 mod closed;
+mod predictive;
 mod reference;
 mod table;

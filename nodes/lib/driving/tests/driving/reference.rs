@@ -1,12 +1,24 @@
 //! The driver on the reference car, which shares no model with it.
 
-use gripsight_driving::{CarState, Driver, Drivetrain, Longitudinal, Settings, TireSet, Track, Trust};
+use gripsight_driving::{
+    CarState, Controller, Driver, Drivetrain, Longitudinal, Settings, TireSet, Track, Trust,
+};
 use gripsight_reference_car as reference;
 use gripsight_reference_car::{CarParameters, Command, Course, Friction, Scenario, SensorSample, Simulation};
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 
 #[test]
 fn on_its_projected_tires_the_1_10_car_stays_on_the_track() {
+    stays_on_the_track(Controller::Pursuit, 0.25);
+}
+
+#[test]
+fn on_its_projected_tires_predictive_control_keeps_it_nearer_to_the_line() {
+    stays_on_the_track(Controller::Predictive, 0.2);
+}
+
+/// No farther from the line than `most_m`.
+fn stays_on_the_track(controller: Controller, most_m: f64) {
     let car = CarParameters::by_name("f1tenth").unwrap();
     let vehicle = VehicleParameters::from_ros_yaml(&car.vehicle_file("f1tenth")).unwrap();
     let line = reference::Track::by_name("club", car.track_scale, false).unwrap();
@@ -24,7 +36,8 @@ fn on_its_projected_tires_the_1_10_car_stays_on_the_track() {
         top_speed_mps: car.top_speed_mps,
         told: Longitudinal::UNKNOWN,
     };
-    let mut driver = Driver::new(vehicle, drivetrain, track, set, Settings::default()).unwrap();
+    let mut driver =
+        Driver::new(vehicle, drivetrain, track, set, Settings { controller, ..Settings::default() }).unwrap();
     let course = Course::Track { name: "club".to_owned(), reversed: false };
     let mut scenario = Scenario::new(car).course(course).friction(Friction::Uniform { mu: 0.9 });
     scenario.effects = scenario.car.own_effects(0.9);
@@ -58,6 +71,8 @@ fn on_its_projected_tires_the_1_10_car_stays_on_the_track() {
         driven_m += (now.station_m - station_m).rem_euclid(line.length_m()) % (0.9 * line.length_m());
         station_m = now.station_m;
     }
-    assert!(worst_m < width, "{worst_m} m of {width} m");
+    assert!(worst_m < most_m && most_m < width, "{worst_m} m of {width} m");
     assert!(driven_m > 2.0 * line.length_m(), "{driven_m} m");
+    let instead = driver.solves().map(|s| s.not_converged);
+    assert_eq!(instead, (controller == Controller::Predictive).then_some(0));
 }
