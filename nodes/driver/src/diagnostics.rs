@@ -1,5 +1,6 @@
 //! How the driver is, from what the node knows.
 
+use gripsight_driving::Solves;
 use gripsight_runtime::{Level, Status};
 
 use crate::laps::Lap;
@@ -27,6 +28,9 @@ pub(crate) struct Facts {
     pub(crate) sets: u32,
     pub(crate) rests_on: &'static str,
     pub(crate) last_lap: Option<Lap>,
+    /// How predictive control did, where it was chosen, and whether the pursuit has steered in its place since the last report.
+    pub(crate) solves: Option<Solves>,
+    pub(crate) replaced: bool,
 }
 
 /// ERROR where the car cannot be driven; WARN off the track, held back, or on tires that nobody measured.
@@ -39,6 +43,12 @@ pub(crate) fn status(facts: &Facts) -> Status {
         (Level::Warn, format!("the last set was not taken: {why}"))
     } else if let Some(why) = &facts.model_refused {
         (Level::Warn, format!("the extended model was not taken: {why}"))
+    } else if let Some(solves) = facts.solves.filter(|_| facts.replaced) {
+        let text = format!(
+            "predictive control did not converge: the pursuit steered, {} commands so far",
+            solves.not_converged
+        );
+        (Level::Warn, text)
     } else if facts.held_back {
         let text =
             format!("held back to a grip of {:.2}: the road gave less than the set promises", facts.grip);
@@ -54,6 +64,14 @@ pub(crate) fn status(facts: &Facts) -> Status {
         .value("sets taken", facts.sets)
         .value("tires", facts.rests_on)
         .value("extended model", if facts.model.is_empty() { "none" } else { &facts.model });
+    let status = match &facts.solves {
+        None => status.value("controller", "pursuit"),
+        Some(solves) => status
+            .value("controller", "mpc")
+            .value("commands of the controller", solves.commands)
+            .value("of the pursuit, not converged", solves.not_converged)
+            .value("of the pursuit, too slow a car", solves.slow),
+    };
     match &facts.last_lap {
         None => status,
         Some(lap) => status
@@ -78,6 +96,15 @@ mod tests {
             (Facts { outside_m: Some(0.12), ..driving.clone() }, Level::Warn, "off the track by 0.12 m"),
             (Facts { refused: Some("of another car".into()), ..driving.clone() }, Level::Warn, "another car"),
             (Facts { model_refused: Some("no better".into()), ..driving.clone() }, Level::Warn, "no better"),
+            (
+                Facts {
+                    solves: Some(Solves { not_converged: 3, ..Solves::default() }),
+                    replaced: true,
+                    ..driving.clone()
+                },
+                Level::Warn,
+                "the pursuit steered, 3 commands",
+            ),
             (Facts { held_back: true, ..driving.clone() }, Level::Warn, "grip of 0.80"),
             (Facts { sets: 0, ..driving }, Level::Warn, "start's tires"),
         ];

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use gripsight_bag::decode;
-use gripsight_driving::{DriveCommand, Driven, Driver, Trust};
+use gripsight_driving::{DriveCommand, Driven, Driver, Solves, Trust};
 use gripsight_identification::vehicle_hash;
 use gripsight_msgs::standard::ackermann_msgs::{AckermannDrive, AckermannDriveStamped};
 use gripsight_msgs::standard::nav_msgs::Odometry;
@@ -167,6 +167,10 @@ impl Wheel {
             tracing::warn!("the extended model is {why}");
             (self.facts.model_refused, self.facts.given_back) = (Some(why), true);
         }
+        let solves = self.driver.solves().copied();
+        let failed = |solves: &Option<Solves>| solves.map_or(0, |solves| solves.not_converged);
+        self.facts.replaced = failed(&solves) > failed(&self.facts.solves);
+        self.facts.solves = solves;
         self.facts.grip = self.driver.grip();
         self.facts.held_back = self.driver.held_back();
         self.facts.rests_on = rests_on(self.driver.trust());

@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use gripsight_driving::{CarState, Driver, Drivetrain, Longitudinal, Settings as Style, TireSet, Track};
+use gripsight_driving::{
+    CarState, Driver, Drivetrain, Longitudinal, Predictive, Settings as Style, TireSet, Track,
+};
 use gripsight_msgs::standard::nav_msgs::Odometry;
 use gripsight_runtime::{Descriptor, Node, Parameter, vehicle_parameters};
 use gripsight_vehicle::VehicleParameters;
@@ -35,6 +37,13 @@ impl Settings {
             "take_provisional",
             false,
             Descriptor::new("Whether sets whose peak rests on a friction prior are driven on, too"),
+        )?;
+        let controller = node.parameter(
+            "controller",
+            "pursuit".to_owned(),
+            Descriptor::new("Who steers: pursuit, or mpc for predictive control")
+                .choices(&["pursuit", "mpc"])
+                .read_only(),
         )?;
         let mut number = |name: &str, default: f64, low: f64, high: f64, meaning: &str| {
             node.parameter(name, default, Descriptor::new(meaning).range(low..=high).read_only())
@@ -77,6 +86,17 @@ impl Settings {
                 3.0,
                 "Grip planned over what a set promises at most, where the peak is not known [-]",
             )?,
+            controller: controller.get().parse().map_err(anyhow::Error::msg)?,
+            predictive: Predictive {
+                most_rate_radps: number(
+                    "steering_rate_radps",
+                    known.predictive.most_rate_radps,
+                    0.05,
+                    20.0,
+                    "Largest rate of the steering, for mpc [rad/s]",
+                )?,
+                ..known.predictive
+            },
             ..known
         };
         let friction = number(
