@@ -3,6 +3,8 @@
 # Usage: launch_scripts/closed_loop.sh OUT [--quick] [more options; --help lists them]
 # --experiment changes: the floor changes in the middle of each run, between dry and wet; OUT/changes.csv, a row a change.
 # --experiment effects: a delay, a lag, a shifted v_y, a worn axle, without and with the diagnosis, told, and wrongly named; OUT/effects.csv, a row a lap.
+# --experiment controllers: pursuit and predictive control beside each other, on the true tires; OUT/controllers.csv, a row a run.
+# --controller mpc: predictive control steers in the other experiments; a folder holds the runs of one.
 # --experiment picture: OUT/laps.svg, the picture of README.
 # Writes OUT/laps.csv (a row a lap) and OUT/summary.md, which also goes to standard output. --quick: minutes instead of an hour.
 # What these hold already is not driven again: a run that was broken off goes on.

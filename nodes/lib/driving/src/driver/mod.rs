@@ -8,90 +8,40 @@
 //! | a prior's peak (provisional) | up to that and to the peak that the data find most likely, in larger steps |
 //! | the car slid, or the identifier warns | what the road gave, until a set knows better |
 
+mod grip;
+mod settings;
+mod speed;
+
 use std::collections::VecDeque;
 
 use gripsight_vehicle::VehicleParameters;
 
+use self::grip::{CAREFUL, CAUGHT};
+pub use self::settings::Settings;
 use crate::extended::Named;
 use crate::governor::Governor;
 use crate::plan::Plan;
-use crate::predictive::{Predicting, Predictive, Solves};
+use crate::predictive::{Predicting, Solves};
 use crate::probation::{GivenBack, Probation};
 use crate::profile::{Drivetrain, SpeedProfile};
 use crate::progress::Progress;
-use crate::pursuit::{Pursuing, Pursuit};
-use crate::state::{Asked, CarState, DriveCommand, wheels_rad};
+use crate::pursuit::Pursuing;
+use crate::state::{Asked, CarState, DriveCommand};
 use crate::steering::{Controller, Moment, Steering};
 use crate::tires::{TireSet, Trust};
 use crate::trial::{Memory, Model, Trial, trial};
 use crate::{Actuator, DrivingError, Longitudinal, Place, Track};
 
-/// How boldly to drive.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
-    /// Share of a known grip to plan with.
-    pub share: f64,
-    /// Grip planned over what was driven without a slide, where the peak is not known; 1: never beyond.
-    pub step: f64,
-    /// The same where a prior says that there is more.
-    pub prior_step: f64,
-    /// Grip planned over what the set promises at most, where the peak is not known: a promise is the lower end of an interval.
-    pub beyond: f64,
-    /// Who steers.
-    pub controller: Controller,
-    /// Pursuit.
-    pub pursuit: Pursuit,
-    /// Predictive control.
-    pub predictive: Predictive,
-    /// Gain of the speed controller.
-    pub speed_gain_1ps: f64,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            share: 0.98,
-            step: 1.15,
-            prior_step: 1.2,
-            beyond: 1.5,
-            controller: Controller::default(),
-            pursuit: Pursuit::default(),
-            predictive: Predictive::default(),
-            speed_gain_1ps: 4.0,
-        }
-    }
-}
-
 /// Longest delay that is made up for.
 const LATEST_S: f64 = 0.5;
 /// Oldest state that is made up for: beyond, the clocks differ.
 const OLDEST_S: f64 = 0.2;
-/// Share of the most likely peak to explore up to, where it was not reached.
-const LIKELY: f64 = 0.96;
-/// Share of an assumed grip to begin with: what nobody measured is no promise.
-const CAREFUL: f64 = 0.5;
-/// Grip planned over what the car turned with, up to an assumed grip.
-const ASSURED: f64 = 1.2;
-/// Share of the planned grip up to which the plan may grow: not in the middle of a corner.
-const GENTLE: f64 = 0.7;
-/// Share of what the road gave when the car slid, to go on with.
-const CAUGHT: f64 = 0.96;
-/// Growth of that with each part of a lap driven, as the slide may have been a puddle.
+/// Growth of what the road gave with each part of a lap driven, as the slide may have been a puddle.
 const REGAINED: f64 = 1.01;
 /// Share of the grip to go on with after a warning that names no figure.
 const WARNED: f64 = 0.7;
-/// Share of the drive that is always left: cornering alone slows the car.
-const LEAST_DRIVE: f64 = 0.5;
-/// Share of the brakes that is always left: a car that pushes over its front wheels gets slower or leaves.
-const LEAST_BRAKE: f64 = 0.5;
-/// Most that the driver drives against a slide sideways: more upsets a car at its limit.
-const SLIDE_MPS2: f64 = 0.5;
-/// Time in which a car settles after a model was given back.
-const SETTLES_S: f64 = 2.0;
 /// Time of the last lap, over that planned, that is remembered to try models on.
 const LAP_MARGIN: f64 = 1.1;
-/// Share of the half width from which the car slows down.
-const WIDE: f64 = 0.6;
 
 /// Drives a car around a track.
 #[derive(Debug, Clone)]
@@ -392,119 +342,5 @@ impl Driver {
         let most = self.vehicle.max_steering_rad;
         let actuator = self.named.actuator(&self.actuator);
         ((angle_rad - actuator.offset_rad) / actuator.gain).clamp(-most, most)
-    }
-
-    /// Speed aimed at, and the acceleration towards it.
-    fn longitudinal(&self, state: &CarState, place: Place, angle_rad: f64) -> (f64, f64) {
-        let limits = &self.plan.limits;
-        let point = self.track.at(place.station_m);
-        let width = if place.offset_m > 0.0 { point.left_m } else { point.right_m };
-        let wide = (place.offset_m.abs() / width - WIDE).max(0.0);
-        let room = (1.0 - 0.5 * wide).max(0.5);
-        // A command acts later: it is meant for where the car then is.
-        let ahead_m = limits.told.ahead_s() * state.v_x_mps;
-        let (speed_mps, slope) = self.plan.profile.at(place.station_m + ahead_m);
-        let speed_mps = speed_mps * room;
-        let turned = state.v_x_mps * state.yaw_rate_radps;
-        // Front tires that steer and a body that slides sideways hold the car back.
-        let slide = -state.v_y_mps * state.yaw_rate_radps;
-        let scrub = slide.clamp(-SLIDE_MPS2, SLIDE_MPS2)
-            + (self.vehicle.l_r_m / self.vehicle.wheelbase_m() * turned * angle_rad.sin()).max(0.0);
-        let left = limits.left_beside(turned);
-        // What holds the car back is made up for where it gains speed. Tires at their limit sideways have nothing left for it, and a car that is
-        // slower than planned where it brakes has room for a corner.
-        let resisted = if slope > 0.0 { left * limits.told.resistance_mps2(state.v_x_mps) } else { 0.0 };
-        let wanted =
-            slope * room + scrub + resisted + self.settings.speed_gain_1ps * (speed_mps - state.v_x_mps);
-        let drive =
-            limits.drive_at_mps2(state.v_x_mps) * left.max(LEAST_DRIVE) * if wide > 0.0 { 0.5 } else { 1.0 };
-        // Whoever is too fast for a plan that was taken back has more to brake with than it says beside the turning.
-        let least = if self.held_back() { LEAST_BRAKE } else { 0.15 };
-        let brake = limits.brake_mps2 * left.max(least);
-        (speed_mps, wanted.clamp(-brake, drive))
-    }
-
-    fn watch(&mut self, state: &CarState) {
-        let Actuator { delay_s, lag_s, .. } = self.late();
-        let seen = self.asked.front().is_some_and(|a| a.from_s <= state.stamp_s - delay_s + 1e-9);
-        let acting = wheels_rad(&self.asked, state.stamp_s, delay_s, lag_s).filter(|_| seen);
-        let Some(acting) = acting else { return };
-        if state.v_x_mps < 1.0 {
-            self.governor.reset();
-            return;
-        }
-        let assumed = self.is_assumed();
-        let Some(look) = self.governor.look(state, acting, &self.vehicle, &self.plan.tires, assumed) else {
-            return;
-        };
-        if look.given.is_some()
-            && let Some(before) = self.probation.slides(&self.named)
-        {
-            self.trusted_until_s = state.stamp_s + SETTLES_S;
-            self.caught = self.caught_before;
-            self.tell(before);
-        } else if look.given.is_some() && state.stamp_s < self.trusted_until_s {
-            // The end of what the model brought about.
-        } else if let Some(given) = look.given {
-            self.catch(CAUGHT * given);
-        } else if assumed {
-            self.turned = self.turned.max(look.turned);
-            if look.turned < GENTLE * self.plan.grip && self.allowed() > 1.02 * self.plan.grip {
-                self.renew();
-            }
-        }
-    }
-
-    /// Whether nobody measured the tires planned with.
-    fn is_assumed(&self) -> bool {
-        self.start.trust == Trust::Assumed && self.known.is_none() && self.prior.is_none()
-    }
-
-    fn catch(&mut self, grip: f64) {
-        self.caught = Some(self.caught.map_or(grip, |before| before.min(grip)).max(0.05));
-        self.renew();
-    }
-
-    /// Grip to plan with.
-    fn allowed(&self) -> f64 {
-        let Settings { share, step, prior_step, beyond, .. } = self.settings;
-        let base = self.known.as_ref().unwrap_or(&self.start);
-        let named = TireSet { tires: self.named.planned(&base.tires), ..*base };
-        let shown = named.grip();
-        let careful = (ASSURED * self.turned).max(CAREFUL * share * shown).min(share * shown);
-        let driven = self.driven.max(if base.trust == Trust::Assumed { careful } else { share * shown });
-        let driven = driven.max(self.turned.min(share * self.start.grip()));
-        let over = self.named.grip.map_or(1.0, |[front, rear]| front.min(rear));
-        let likely_peak = base.likely_peak.map(|peak| over * peak);
-        let likely = likely_peak.unwrap_or(f64::INFINITY);
-        let bold = (step * driven).min(beyond * shown);
-        let alone = match base.trust {
-            Trust::Assumed => careful.max(self.driven).min(share * shown),
-            Trust::Accepted => bold.min(share * likely_peak.unwrap_or(shown)).max(share * shown),
-            Trust::AcceptedWithin => bold.min(LIKELY * likely).max(share * shown),
-            Trust::Provisional => share * shown,
-        };
-        let grip = match &self.prior {
-            _ if base.trust == Trust::Accepted => alone,
-            // A prior below what was driven and a step is no reason to drive slower, unless nothing was shown.
-            Some(prior) if base.trust == Trust::Assumed => (share * prior.grip()).min(prior_step * driven),
-            Some(prior) => {
-                (LIKELY * prior.grip().min(likely)).max(alone).min(prior_step * driven).min(beyond * shown)
-            }
-            None => alone,
-        };
-        self.caught.map_or(grip, |caught| grip.min(caught))
-    }
-
-    /// The set that steering rests on.
-    fn base(&self) -> &TireSet {
-        self.known.as_ref().or(self.prior.as_ref()).unwrap_or(&self.start)
-    }
-
-    fn renew(&mut self) {
-        let tires = self.named.planned(&self.base().tires);
-        self.plan = Plan::new(&self.vehicle, &self.drivetrain, &self.track, &tires, self.allowed());
-        self.progress.planned(self.plan.grip);
-        self.governor.reset();
     }
 }

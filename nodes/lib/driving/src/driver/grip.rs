@@ -1,0 +1,106 @@
+//! Grip to plan with: what sets promise, what was driven, and what the road gave.
+
+use super::{Driver, Settings};
+use crate::Actuator;
+use crate::plan::Plan;
+use crate::state::{CarState, wheels_rad};
+use crate::tires::{TireSet, Trust};
+
+/// Share of the most likely peak to explore up to, where it was not reached.
+const LIKELY: f64 = 0.96;
+/// Share of an assumed grip to begin with: what nobody measured is no promise.
+pub(super) const CAREFUL: f64 = 0.5;
+/// Grip planned over what the car turned with, up to an assumed grip.
+const ASSURED: f64 = 1.2;
+/// Share of the planned grip up to which the plan may grow: not in the middle of a corner.
+const GENTLE: f64 = 0.7;
+/// Share of what the road gave when the car slid, to go on with.
+pub(super) const CAUGHT: f64 = 0.96;
+/// Time in which a car settles after a model was given back.
+const SETTLES_S: f64 = 2.0;
+
+impl Driver {
+    pub(super) fn watch(&mut self, state: &CarState) {
+        let Actuator { delay_s, lag_s, .. } = self.late();
+        let seen = self.asked.front().is_some_and(|a| a.from_s <= state.stamp_s - delay_s + 1e-9);
+        let acting = wheels_rad(&self.asked, state.stamp_s, delay_s, lag_s).filter(|_| seen);
+        let Some(acting) = acting else { return };
+        if state.v_x_mps < 1.0 {
+            self.governor.reset();
+            return;
+        }
+        let assumed = self.is_assumed();
+        let Some(look) = self.governor.look(state, acting, &self.vehicle, &self.plan.tires, assumed) else {
+            return;
+        };
+        if look.given.is_some()
+            && let Some(before) = self.probation.slides(&self.named)
+        {
+            self.trusted_until_s = state.stamp_s + SETTLES_S;
+            self.caught = self.caught_before;
+            self.tell(before);
+        } else if look.given.is_some() && state.stamp_s < self.trusted_until_s {
+            // The end of what the model brought about.
+        } else if let Some(given) = look.given {
+            self.catch(CAUGHT * given);
+        } else if assumed {
+            self.turned = self.turned.max(look.turned);
+            if look.turned < GENTLE * self.plan.grip && self.allowed() > 1.02 * self.plan.grip {
+                self.renew();
+            }
+        }
+    }
+
+    /// Whether nobody measured the tires planned with.
+    pub(super) fn is_assumed(&self) -> bool {
+        self.start.trust == Trust::Assumed && self.known.is_none() && self.prior.is_none()
+    }
+
+    pub(super) fn catch(&mut self, grip: f64) {
+        self.caught = Some(self.caught.map_or(grip, |before| before.min(grip)).max(0.05));
+        self.renew();
+    }
+
+    /// Grip to plan with.
+    pub(super) fn allowed(&self) -> f64 {
+        let Settings { share, step, prior_step, beyond, .. } = self.settings;
+        let base = self.known.as_ref().unwrap_or(&self.start);
+        let named = TireSet { tires: self.named.planned(&base.tires), ..*base };
+        let shown = named.grip();
+        let careful = (ASSURED * self.turned).max(CAREFUL * share * shown).min(share * shown);
+        let driven = self.driven.max(if base.trust == Trust::Assumed { careful } else { share * shown });
+        let driven = driven.max(self.turned.min(share * self.start.grip()));
+        let over = self.named.grip.map_or(1.0, |[front, rear]| front.min(rear));
+        let likely_peak = base.likely_peak.map(|peak| over * peak);
+        let likely = likely_peak.unwrap_or(f64::INFINITY);
+        let bold = (step * driven).min(beyond * shown);
+        let alone = match base.trust {
+            Trust::Assumed => careful.max(self.driven).min(share * shown),
+            Trust::Accepted => bold.min(share * likely_peak.unwrap_or(shown)).max(share * shown),
+            Trust::AcceptedWithin => bold.min(LIKELY * likely).max(share * shown),
+            Trust::Provisional => share * shown,
+        };
+        let grip = match &self.prior {
+            _ if base.trust == Trust::Accepted => alone,
+            // A prior below what was driven and a step is no reason to drive slower, unless nothing was shown.
+            Some(prior) if base.trust == Trust::Assumed => (share * prior.grip()).min(prior_step * driven),
+            Some(prior) => {
+                (LIKELY * prior.grip().min(likely)).max(alone).min(prior_step * driven).min(beyond * shown)
+            }
+            None => alone,
+        };
+        self.caught.map_or(grip, |caught| grip.min(caught))
+    }
+
+    /// The set that steering rests on.
+    pub(super) fn base(&self) -> &TireSet {
+        self.known.as_ref().or(self.prior.as_ref()).unwrap_or(&self.start)
+    }
+
+    pub(super) fn renew(&mut self) {
+        let tires = self.named.planned(&self.base().tires);
+        self.plan = Plan::new(&self.vehicle, &self.drivetrain, &self.track, &tires, self.allowed());
+        self.progress.planned(self.plan.grip);
+        self.governor.reset();
+    }
+}

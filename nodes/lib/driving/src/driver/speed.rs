@@ -1,0 +1,46 @@
+//! Motor and brakes: towards the speed that is planned.
+
+use super::Driver;
+use crate::Place;
+use crate::state::CarState;
+
+/// Share of the drive that is always left: cornering alone slows the car.
+const LEAST_DRIVE: f64 = 0.5;
+/// Share of the brakes that is always left: a car that pushes over its front wheels gets slower or leaves.
+const LEAST_BRAKE: f64 = 0.5;
+/// Most that the driver drives against a slide sideways: more upsets a car at its limit.
+const SLIDE_MPS2: f64 = 0.5;
+/// Share of the half width from which the car slows down.
+const WIDE: f64 = 0.6;
+
+impl Driver {
+    /// Speed aimed at, and the acceleration towards it.
+    pub(super) fn longitudinal(&self, state: &CarState, place: Place, angle_rad: f64) -> (f64, f64) {
+        let limits = &self.plan.limits;
+        let point = self.track.at(place.station_m);
+        let width = if place.offset_m > 0.0 { point.left_m } else { point.right_m };
+        let wide = (place.offset_m.abs() / width - WIDE).max(0.0);
+        let room = (1.0 - 0.5 * wide).max(0.5);
+        // A command acts later: it is meant for where the car then is.
+        let ahead_m = limits.told.ahead_s() * state.v_x_mps;
+        let (speed_mps, slope) = self.plan.profile.at(place.station_m + ahead_m);
+        let speed_mps = speed_mps * room;
+        let turned = state.v_x_mps * state.yaw_rate_radps;
+        // Front tires that steer and a body that slides sideways hold the car back.
+        let slide = -state.v_y_mps * state.yaw_rate_radps;
+        let scrub = slide.clamp(-SLIDE_MPS2, SLIDE_MPS2)
+            + (self.vehicle.l_r_m / self.vehicle.wheelbase_m() * turned * angle_rad.sin()).max(0.0);
+        let left = limits.left_beside(turned);
+        // What holds the car back is made up for where it gains speed. Tires at their limit sideways have nothing left for it, and a car that is
+        // slower than planned where it brakes has room for a corner.
+        let resisted = if slope > 0.0 { left * limits.told.resistance_mps2(state.v_x_mps) } else { 0.0 };
+        let wanted =
+            slope * room + scrub + resisted + self.settings.speed_gain_1ps * (speed_mps - state.v_x_mps);
+        let drive =
+            limits.drive_at_mps2(state.v_x_mps) * left.max(LEAST_DRIVE) * if wide > 0.0 { 0.5 } else { 1.0 };
+        // Whoever is too fast for a plan that was taken back has more to brake with than it says beside the turning.
+        let least = if self.held_back() { LEAST_BRAKE } else { 0.15 };
+        let brake = limits.brake_mps2 * left.max(least);
+        (speed_mps, wanted.clamp(-brake, drive))
+    }
+}
