@@ -79,13 +79,13 @@ pub(crate) struct Moment<'a> {
 
 impl Moment<'_> {
     /// When the command goes out.
-    pub(crate) fn from_s(&self) -> f64 {
+    pub(crate) fn goes_s(&self) -> f64 {
         self.now.stamp_s + self.age_s
     }
 
     /// Since the command before; 0 where there is none.
     pub(crate) fn dt_s(&self) -> f64 {
-        self.asked.back().map_or(0.0, |last| self.from_s() - last.from_s)
+        self.asked.back().map_or(0.0, |last| self.goes_s() - last.from_s)
     }
 
     /// The car `lead_s` after the command begins to act, with what was asked before. `lacks`: accelerations of v_y and of the yaw rate that the model
@@ -101,7 +101,7 @@ impl Moment<'_> {
 
     /// The wheels' angle when the command begins to act; `None`: nothing was asked for so far.
     pub(crate) fn wheels_rad(&self) -> Option<f64> {
-        wheels_rad(self.asked, self.from_s() + self.delay_s, self.delay_s, self.lag_s)
+        wheels_rad(self.asked, self.goes_s() + self.delay_s, self.delay_s, self.lag_s)
     }
 
     /// The wheels' angle when the car was measured.

@@ -26,7 +26,7 @@ const SLOW_MPS: f64 = 1.0;
 const STALE_S: f64 = 0.1;
 /// Time in which what the model lacks is over: a bend later it is something else.
 const LACKS_S: f64 = 0.4;
-/// Delay that makes the controller half as quick: on tires that are an eighth off, the quick one swings from 0.15 s on.
+/// Delay and lag that make the controller half as quick: on tires that are an eighth off, the quick one swings from 0.15 s on.
 const GENTLE_S: f64 = 0.15;
 
 /// What the controller weighs, and what the steering can do.
@@ -145,7 +145,7 @@ impl Predicting {
             self.last = None;
             return Err(NoAngle::Slow);
         }
-        let acts_s = at.from_s() + at.delay_s;
+        let acts_s = at.goes_s() + at.delay_s;
         let fresh = self
             .last
             .as_ref()
@@ -191,7 +191,7 @@ impl Predicting {
                 offset_m: self.style.offset_wheelbases * wheelbase_m,
                 course_rad: self.style.course_rad,
                 // Who sees later what it brought about steers more gently.
-                rate_radps: self.style.rate_radps / (1.0 + (at.age_s + at.delay_s) / GENTLE_S),
+                rate_radps: self.style.rate_radps / (1.0 + (at.age_s + at.delay_s + at.lag_s) / GENTLE_S),
                 outside_m: 0.05 * wheelbase_m,
                 slip_rad: 0.01,
                 end: self.style.end,
