@@ -99,7 +99,7 @@ fn drive(case: &Case, name: &str, verbose: bool) -> Result<Row> {
         time_s: parts(mean(later().map(|lap| lap.time_s)), 1e3),
         error_m: parts(mean(later().map(|lap| lap.error_m)), 1e4),
         worst_m: parts(later().map(|lap| lap.worst_m).fold(0.0, f64::max), 1e4),
-        half_width_m: run.driver.track().points()[0].left_m,
+        half_width_m: parts(run.driver.track().points()[0].left_m, 1e3),
         used: parts(mean(later().map(|lap| lap.used)), 1e4),
         exits: run.referee.exits(),
         wreck: wreck.unwrap_or("").to_owned(),
@@ -126,23 +126,25 @@ fn summary(rows: &[Row]) -> String {
             if of().count() == 0 {
                 continue;
             }
+            // A run that ended before its second lap has no figures of one.
+            let average = |figure: fn(&Row) -> f64| mean(of().map(figure).filter(|f| f.is_finite()));
             let longest = |figure: fn(&Row) -> f64| of().map(figure).fold(0.0, f64::max);
             let _ = writeln!(
                 text,
                 "| {car} | {mu} | {name} | {} | {:.2} | {:.3} | {:.3} | {:.2} | {:.1} % | {} | {} | {} | {} | {:.1} | {:.0} | {:.0} |",
                 of().count(),
-                mean(of().map(|r| r.time_s)),
-                mean(of().map(|r| r.error_m)),
+                average(|r| r.time_s),
+                average(|r| r.error_m),
                 longest(|r| r.worst_m),
                 longest(|r| r.half_width_m),
-                100.0 * mean(of().map(|r| r.used)),
+                100.0 * average(|r| r.used),
                 of().map(|r| r.exits).sum::<u32>(),
                 of().filter(|r| !r.wreck.is_empty()).count(),
                 of().map(|r| r.commands).sum::<u64>(),
                 of().map(|r| r.not_converged).sum::<u64>(),
-                mean(of().map(|r| r.iterations)),
-                mean(of().map(|r| r.command_us)),
-                mean(of().map(|r| r.times_real_time)),
+                average(|r| r.iterations),
+                average(|r| r.command_us),
+                average(|r| r.times_real_time),
             );
         }
     }

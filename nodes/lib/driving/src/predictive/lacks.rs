@@ -48,7 +48,8 @@ impl Lacks {
         let most_mps2 = MOST * at.plan.table.most_mps2();
         let arm_1pm = at.vehicle.mass_kg * at.vehicle.l_f_m / at.vehicle.yaw_inertia_kgm2;
         for (lane, most) in [most_mps2, most_mps2 * arm_1pm].into_iter().enumerate() {
-            self.mean[lane] += (dt_s / (AVERAGE_S + at.delay_s + at.lag_s)).min(1.0) * (seen[lane] - self.mean[lane]);
+            self.mean[lane] +=
+                (dt_s / (AVERAGE_S + at.delay_s + at.lag_s)).min(1.0) * (seen[lane] - self.mean[lane]);
             self.mean[lane] = self.mean[lane].clamp(-most, most);
         }
         self.mean
