@@ -14,6 +14,8 @@ use crate::model::Residuals;
 
 /// Decrease of the cost, as a share of it, that ends a fit.
 const TOLERANCE: f64 = 1e-3;
+/// Share of the cost that a step along derivatives from elsewhere must take for the next to be along such, too.
+const FAST: f64 = 0.3;
 /// Damping beyond which a step is too short to be worth a rollout.
 const MOST_DAMPING: f64 = 400.0;
 
@@ -31,7 +33,7 @@ impl Fitter<'_> {
     ) -> Result<Fitted, SimulatorError> {
         let layout = &self.layout;
         let (mut state, mut columns) = (from.clone(), columns);
-        let mut fresh = false;
+        let (mut fresh, mut is_settled) = (false, false);
         let mut damping = 1e-3;
         for iteration in 0..iterations {
             let last = iteration + 1 == iterations;
@@ -44,6 +46,7 @@ impl Fitter<'_> {
             let step = normal.step(damping).filter(|step| fresh || normal.gain(step) > TOLERANCE * before);
             let Some(step) = step else {
                 if fresh {
+                    is_settled = true;
                     break;
                 }
                 (state, columns) = self.anew(state, active)?;
@@ -62,6 +65,7 @@ impl Fitter<'_> {
                 if fresh {
                     damping = 30.0 * damping + 0.3;
                     if promised < TOLERANCE * before || damping > MOST_DAMPING {
+                        is_settled = true;
                         break;
                     }
                 } else {
@@ -71,20 +75,22 @@ impl Fitter<'_> {
                 continue;
             }
             damping *= 0.1;
-            let done = (before - cost) / before.max(f64::MIN_POSITIVE) < TOLERANCE;
+            let gained = (before - cost) / before.max(f64::MIN_POSITIVE);
+            let done = gained < TOLERANCE;
             if fresh && (done || last) {
-                state = trial;
+                (state, is_settled) = (trial, done);
                 break;
             }
+            let slow = !fresh && gained < FAST;
             columns = self.learned(&state, &trial, active, columns);
             (state, fresh) = (trial, false);
-            if done {
+            if done || slow {
                 (state, columns) = self.anew(state, active)?;
                 fresh = true;
             }
         }
         let sizes = self.sizes(&state, active, &columns);
-        Ok(Fitted { state, sizes, columns })
+        Ok(Fitted { state, sizes, columns, is_settled })
     }
 
     /// Derivatives by some candidates, with what the way from one state to another says of them.

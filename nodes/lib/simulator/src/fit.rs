@@ -25,6 +25,8 @@ pub(crate) struct Fitted {
     pub(crate) sizes: Vec<Size>,
     /// Derivatives by them.
     pub(crate) columns: Vec<Residuals>,
+    /// Whether it ended where nothing more is gained, and not at its last step.
+    pub(crate) is_settled: bool,
 }
 
 /// A fitted size.

@@ -31,6 +31,12 @@ impl Fitter<'_> {
             let place = |f: &f64| {
                 let mut values = from.point.values.clone();
                 values[c] = self.within(c, values[c] * f);
+                // A count between two is two rollouts.
+                values
+                    .iter_mut()
+                    .zip(self.model.candidates)
+                    .filter(|(_, k)| k.integer)
+                    .for_each(|(v, _)| *v = v.round());
                 (c, values)
             };
             factors.iter().map(place).filter(|(c, v)| v[*c] != from.point.values[*c]).collect()

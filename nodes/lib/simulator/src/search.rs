@@ -19,15 +19,16 @@ use crate::model::Residuals;
 const FOLLOWED: usize = 6;
 /// Candidates whose derivatives are taken anew after the first round.
 const SCREENED: usize = 14;
-/// Rollouts of the recording that a whole diagnosis may take, and those that a last round and the free terms do.
+/// Rollouts of the recording that a whole diagnosis may take, those that a last round and the free terms do, and a fit and the free terms.
 const MOST_ROLLOUTS: f64 = 300.0;
-const LAST: f64 = 85.0;
+const LAST: f64 = 110.0;
+const FIT: f64 = 45.0;
 /// Effects at most.
 const MOST_FOUND: usize = 3;
 /// Cost per residual above which what the likeliest candidate leaves is more than noise.
 const UNEXPLAINED: f64 = 1.5;
 /// Share of the cost from which what is left beside the likeliest candidate says that derivatives may not lead to the cause.
-const SLOW: f64 = 0.1;
+const SLOW: f64 = 0.5;
 /// Gauss-Newton steps of a fit.
 const STEPS: usize = 10;
 
@@ -105,6 +106,11 @@ impl Fitter<'_> {
         let layout = &self.layout;
         for k in (0..found.fits.len().saturating_sub(1)).rev() {
             let Some(last) = found.fits.last() else { return Ok(()) };
+            // Where rollouts are short, a size far beyond its error says enough.
+            let is_clear = last.sizes.get(k).is_some_and(|s| s.wald > 4.0 * self.needed());
+            if is_clear && self.rollouts() + FIT > MOST_ROLLOUTS {
+                continue;
+            }
             let together = found.active();
             let kept: Vec<usize> = together.iter().copied().filter(|c| *c != together[k]).collect();
             let mut values = last.state.point.values.clone();
@@ -191,7 +197,7 @@ impl Fitter<'_> {
             fits.push(fit(*c, trial)?);
         }
         let left = fits.iter().map(|f| f.state.training(layout)).fold(before, f64::min);
-        let affordable = self.rollouts() + self.zooming() + LAST <= MOST_ROLLOUTS;
+        let affordable = self.rollouts() + self.zooming() + FIT <= MOST_ROLLOUTS;
         if !found.zoomed && affordable && left > (UNEXPLAINED * self.residuals()).max(SLOW * before) {
             found.zoomed = true;
             if let Some((c, trial)) = self.zoom(&state, &active)? {
@@ -200,6 +206,14 @@ impl Fitter<'_> {
         }
         found.columns = columns;
         fits.sort_by(|a, b| a.state.training(layout).total_cmp(&b.state.training(layout)));
+        if let Some(best) = fits.first_mut()
+            && !best.is_settled
+            && self.rollouts() + FIT <= MOST_ROLLOUTS
+        {
+            // A size is worth nothing, and neither is its interval, where a fit was stopped on its way.
+            let together: Vec<usize> = best.sizes.iter().map(|s| s.candidate).collect();
+            *best = self.fit(&best.state, &together, best.columns.clone(), STEPS)?;
+        }
         let Some(best) = fits.first() else { return Ok((round, None)) };
         let of = |f: &Fitted| f.sizes.last().map(|s| s.candidate);
         let costs: Vec<(usize, Vec<f64>)> = fits
