@@ -28,6 +28,28 @@ fn blocks(page: &str) -> Vec<String> {
     parts.map(|b| b.split_once('\n').unwrap().1.to_owned()).collect()
 }
 
+/// The commands in a line of text, each alternative of `a|b` by itself.
+fn commands(page: &Path) -> Vec<String> {
+    let text = fs::read_to_string(page).unwrap();
+    let outside = text.split("```").step_by(2);
+    let inline = outside.flat_map(|t| t.split('`').skip(1).step_by(2).map(str::to_owned).collect::<Vec<_>>());
+    let of = inline.filter_map(|c| {
+        Some(c.strip_prefix("gripsight ")?.split_whitespace().map(str::to_owned).collect::<Vec<_>>())
+    });
+    of.flat_map(|words| {
+        let ways: Vec<String> = words
+            .iter()
+            .find(|w| w.contains('|'))
+            .map_or_else(|| vec![String::new()], |w| w.split('|').map(str::to_owned).collect());
+        let line = |way: &String| {
+            let chosen = words.iter().map(|w| if w.contains('|') { way } else { w });
+            chosen.cloned().collect::<Vec<_>>().join(" ")
+        };
+        ways.iter().map(line).collect::<Vec<_>>()
+    })
+    .collect()
+}
+
 fn python() -> String {
     let venv = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../.venv/bin/python");
     if venv.exists() { venv.display().to_string() } else { "python3".to_owned() }
@@ -62,6 +84,20 @@ fn a_simulator_of_ones_own_is_diagnosed_as_the_page_says() {
         );
         assert!(gap["patch"]["verified"].as_f64().unwrap() < nominal.as_f64().unwrap());
     }
+}
+
+#[test]
+fn the_commands_of_every_page_are_understood() {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../lib/simulator/pages");
+    let mut seen = 0;
+    for entry in fs::read_dir(folder).unwrap() {
+        for command in commands(&entry.unwrap().path()) {
+            let (code, _, error) = gripsight(&std::env::temp_dir(), &format!("{command} --help"));
+            assert_eq!(code, 0, "{command}: {error}");
+            seen += 1;
+        }
+    }
+    assert!(seen >= 10, "{seen}");
 }
 
 #[test]

@@ -53,3 +53,21 @@ fn two_changes_are_both_found() {
     assert!(names.contains(&"simulator.c_front") && names.contains(&"simulator.delay_steps"), "{names:?}");
     assert!(passes < 300, "{passes}");
 }
+
+#[test]
+fn a_fit_that_is_stopped_on_its_way_says_so_and_goes_on() {
+    let car = TestCar::new();
+    let (sequence, commands) = car.recorded(&[(2, 6.0)], 40.0, 4);
+    let file = SimulatorFile::parse("command: [none]", std::env::temp_dir().as_path()).unwrap();
+    let drive = Drive::new(&sequence, commands, &[Channel::VYMps, Channel::YawRateRadps]).unwrap();
+    let list = candidates(car.description(), &file, &drive.channels, true, &[]);
+    let grip = list.iter().position(|c| c.name == "simulator.grip").unwrap();
+    let model = Model::new(&car, &file, &drive, &list, true);
+    let fitter = Fitter::new(&model);
+    let (state, columns) = fitter.around(model.null(), None, &[grip]).unwrap();
+    let stopped = fitter.fit(&state, &[grip], columns, 1).unwrap();
+    assert!(!stopped.is_settled);
+    let on = fitter.fit(&stopped.state, &[grip], stopped.columns.clone(), STEPS).unwrap();
+    assert!(on.is_settled && (on.sizes[0].value - 6.0).abs() < 0.1, "{:?}", on.sizes);
+    assert!(on.state.training(&fitter.layout) < stopped.state.training(&fitter.layout));
+}

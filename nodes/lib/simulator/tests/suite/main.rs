@@ -6,4 +6,5 @@
 mod adapters;
 mod child;
 mod export;
+mod pages;
 mod support;
