@@ -8,6 +8,16 @@
     reason = "doc comments of arguments are help texts: <car> is a name left open"
 )]
 
+/// Prints on standard output; see [`say`].
+macro_rules! print {
+    ($($text:tt)*) => { $crate::say(format_args!($($text)*)) };
+}
+
+/// Prints a line on standard output; see [`say`].
+macro_rules! println {
+    ($($text:tt)*) => { $crate::say(format_args!("{}\n", format_args!($($text)*))) };
+}
+
 mod bag;
 mod camera;
 mod data;
@@ -26,7 +36,7 @@ mod simulator;
 mod verify;
 mod withheld;
 
-use std::io::IsTerminal as _;
+use std::io::{ErrorKind, IsTerminal as _, Write as _};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -84,6 +94,17 @@ fn main() -> ExitCode {
             error.chain().skip(1).for_each(|cause| eprintln!("  because: {cause}"));
             ExitCode::FAILURE
         }
+    }
+}
+
+/// Prints on standard output. The standard library's macros panic where a reader has seen enough and closed the pipe (`| head`); here what is left is said to
+/// nobody, and the files are written all the same.
+fn say(text: std::fmt::Arguments<'_>) {
+    match std::io::stdout().lock().write_fmt(text) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            eprintln!("error: cannot write to standard output: {error}");
+        }
+        _ => {}
     }
 }
 

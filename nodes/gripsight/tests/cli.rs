@@ -165,6 +165,22 @@ fn every_file_is_written_and_the_exit_code_says_whether_to_use_them() {
 }
 
 #[test]
+fn a_reader_that_closes_the_pipe_ends_nothing() {
+    let drive = Drive::shared();
+    let out = drive.folder.path().join("piped.mcap");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_gripsight"))
+        .args(["simulate", "--duration", "10", "--out", out.to_str().unwrap()])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    assert!(out.is_file());
+}
+
+#[test]
 fn a_set_holds_on_its_own_drive_and_a_set_that_promises_more_does_not() {
     let drive = Drive::shared();
     let (output, folder) = drive.identify("to_verify", &["--residual", "none"]);
