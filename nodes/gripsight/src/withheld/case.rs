@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use gripsight_bag::TopicMap;
-use gripsight_diagnosis::{Diagnosis, GapError, Request, diagnose};
+use gripsight_diagnosis::{Diagnosis, Earlier, GapError, Request, diagnose};
 use gripsight_signals::StateSequence;
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 use gripsight_withheld_make::{COMMITMENT, files};
@@ -18,7 +18,8 @@ use crate::diagnose;
 /// What lies in a case's folder.
 pub(super) struct Case {
     sequence: StateSequence,
-    held_out: StateSequence,
+    held_out: Option<StateSequence>,
+    earlier: Option<StateSequence>,
     vehicle: VehicleParameters,
     tires: Option<PacejkaParameters>,
     without: Vec<String>,
@@ -30,13 +31,15 @@ impl Case {
         let bag = |name: &str| -> anyhow::Result<StateSequence> {
             Ok(diagnose::read(&folder.join(name), &TopicMap::default())?.0)
         };
+        let there = |name: &str| folder.join(name).exists().then(|| bag(name)).transpose();
         let tires = folder.join(files::TIRES);
         let without = folder.join(files::WITHOUT);
         let without =
             fs::read_to_string(&without).with_context(|| format!("cannot read {}", without.display()))?;
         Ok(Self {
             sequence: bag(files::BAG)?,
-            held_out: bag(files::HELD_OUT)?,
+            held_out: there(files::HELD_OUT)?,
+            earlier: there(files::EARLIER)?,
             vehicle: diagnose::vehicle(Some(&folder.join(files::VEHICLE)))?,
             tires: tires.exists().then(|| diagnose::tires(&tires)).transpose()?,
             without: without.lines().map(str::to_owned).collect(),
@@ -46,13 +49,16 @@ impl Case {
     /// Diagnoses it; `only` names the effects to consider, the whole library where there is none.
     pub(super) fn diagnose(&self, only: &[String]) -> Result<Diagnosis, GapError> {
         let request = Request {
-            held_out: Some(&self.held_out),
             tires: self.tires,
             without: if only.is_empty() { &self.without } else { &[] },
             only,
             ..Request::new(&self.sequence, &self.vehicle)
         };
-        diagnose(&request, &mut |_| {})
+        let Some(earlier) = &self.earlier else {
+            return diagnose(&Request { held_out: self.held_out.as_ref(), ..request }, &mut |_| {});
+        };
+        let earlier = Earlier::diagnosed(&Request { sequence: earlier, ..request.clone() }, &mut |_| {})?;
+        diagnose(&Request { tires: None, earlier: Some(&earlier), ..request }, &mut |_| {})
     }
 }
 

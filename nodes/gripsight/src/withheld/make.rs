@@ -54,6 +54,10 @@ pub(crate) struct MakeArgs {
     /// What drives them: tests/plants/make_simulator_pairs.py.
     #[arg(long, value_name = "FILE", requires = "simulators")]
     simulator_maker: Option<PathBuf>,
+    /// Every case is two drives of one car: earlier.mcap, in place of heldout.mcap, is from before its effects came, and only
+    /// these are a change; half of the cars are unchanged.
+    #[arg(long, conflicts_with = "simulators")]
+    compared: bool,
     /// The Python that has the simulators.
     #[arg(long, value_name = "FILE", default_value = "python3", requires = "simulators")]
     python: PathBuf,
@@ -68,7 +72,8 @@ pub(crate) struct MakeArgs {
 const EXAMPLES: &str = "\
 Examples:
   gripsight withheld make --cases 600 --out cases --labels labels.json
-  gripsight withheld make --cases 60 --seed 1 --pool development --duration 30 --out cases --labels labels.json";
+  gripsight withheld make --cases 60 --seed 1 --pool development --duration 30 --out cases --labels labels.json
+  gripsight withheld make --cases 100 --recorded bags --recorded-cases 40 --compared --out cases --labels labels.json";
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum PoolName {
@@ -107,6 +112,7 @@ pub(crate) fn run(args: &MakeArgs) -> anyhow::Result<Outcome> {
         foreign: drives(args.foreign.as_ref(), args.foreign_cases),
         recorded: drives(args.recorded.as_ref(), args.recorded_cases),
         simulators: pairs(args),
+        compared: args.compared,
     })?;
     let batch = Batch::new(settings)?;
     let waiting: Vec<usize> = (0..batch.len())

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use gripsight_bag::effect::Effect;
 use gripsight_reference_car::{EffectSetting, Scenario, effect_spec};
-use rand::SeedableRng;
 use rand::seq::SliceRandom;
+use rand::{RngExt as _, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -25,6 +26,8 @@ pub mod files {
     pub const BAG: &str = "bag.mcap";
     /// Another drive of the same car in the same state.
     pub const HELD_OUT: &str = "heldout.mcap";
+    /// In place of it where drives are compared: a drive of the same car from before its effects came.
+    pub const EARLIER: &str = "earlier.mcap";
     /// The car.
     pub const VEHICLE: &str = "vehicle.yaml";
     /// The tires, a few percent off; not there for recorded drives.
@@ -56,6 +59,9 @@ pub struct BatchSettings {
     /// Pairs of simulator and car.
     #[serde(default)]
     pub simulators: Option<SimulatorPairs>,
+    /// Whether every case is two drives of a car, before and after its effects came, but for pairs of simulator and car.
+    #[serde(default)]
+    pub compared: bool,
 }
 
 /// A batch as it is planned. Cases can be made in any order.
@@ -74,11 +80,19 @@ impl Batch {
     /// [`WithheldError`] names the drive that cannot be used.
     pub fn new(settings: BatchSettings) -> Result<Self, WithheldError> {
         let random = &mut ChaCha8Rng::seed_from_u64(settings.seed);
-        let mut plan = plan::reference(settings.cases, random);
+        let mut plan = if settings.compared {
+            plan::compared(Family::Reference, settings.cases, &draw::names(true), 1, random)
+        } else {
+            plan::reference(settings.cases, random)
+        };
         let mut drives = |asked: &Option<MeasuredDrives>, family| match asked {
             Some(MeasuredDrives { folder, cases }) => {
                 let drives = measured::read(folder, family == Family::Foreign)?;
-                plan.extend(plan::measured(family, *cases, drives.len(), random));
+                plan.extend(if settings.compared {
+                    plan::compared(family, *cases, &plan::injectable(), drives.len(), random)
+                } else {
+                    plan::measured(family, *cases, drives.len(), random)
+                });
                 Ok::<_, WithheldError>(drives)
             }
             None => Ok(Vec::new()),
@@ -179,9 +193,13 @@ impl Batch {
                 .map(|name| draw::sized(name, scenario.car.wheelbase_m() < 1.0, lap_m, random))
                 .collect::<Result<Vec<_>, _>>()?;
             scenario.effects.retain(|own| asked.iter().all(|a| a.name != own.name));
+            let untouched = scenario.effects.clone();
             scenario.effects.extend(asked.iter().cloned());
-            let held_out = draw::another(&scenario, random);
-            let (first, second) = match (drive::driven(&scenario)?, drive::driven(&held_out)?) {
+            let mut other = draw::another(&scenario, random);
+            if self.settings.compared {
+                other.effects = untouched;
+            }
+            let (first, second) = match (drive::driven(&scenario)?, drive::driven(&other)?) {
                 (Ok(first), Ok(second)) => (first, second),
                 (Err(end), _) | (_, Err(end)) => {
                     last = Some(end);
@@ -193,7 +211,7 @@ impl Batch {
             let without = left_out(planned, random);
             let duration_s = self.settings.duration_s;
             drive::write(&folder.join(files::BAG), &drive::between_margins(&first, duration_s))?;
-            drive::write(&folder.join(files::HELD_OUT), &drive::between_margins(&second, duration_s))?;
+            drive::write(&folder.join(self.other_file()), &drive::between_margins(&second, duration_s))?;
             text(&folder.join(files::VEHICLE), &scenario.car.vehicle_file("car"))?;
             text(&folder.join(files::TIRES), &tires::file(axles))?;
             text(&folder.join(files::WITHOUT), &(without.join("\n") + "\n"))?;
@@ -210,6 +228,7 @@ impl Batch {
             return Ok(CaseLabel {
                 case,
                 family: planned.family,
+                compared: self.settings.compared,
                 kind: planned.kind,
                 effects,
                 without,
@@ -248,24 +267,38 @@ impl Batch {
         };
         let planned = Planned { effects: names, ..planned.clone() };
         let without = left_out(&planned, random);
-        let [first, second] = drive.stretches(&effects, self.settings.duration_s, random)?;
+        let untouched: &[Effect] = if self.settings.compared { &[] } else { &effects };
+        let same = self.settings.compared && random.random_bool(0.5);
+        let [first, second] =
+            drive.stretches([&effects, untouched], same, self.settings.duration_s, random)?;
         drive::write(&folder.join(files::BAG), &first)?;
-        drive::write(&folder.join(files::HELD_OUT), &second)?;
+        drive::write(&folder.join(self.other_file()), &second)?;
         text(&folder.join(files::VEHICLE), &drive.vehicle)?;
         if let Some(axles) = drive.axles {
             text(&folder.join(files::TIRES), &tires::file(tires::off_by_a_little(axles, random)))?;
         }
         text(&folder.join(files::WITHOUT), &(without.join("\n") + "\n"))?;
+        let mut circumstances = BTreeMap::from([("car".to_owned(), Value::from(drive.name.clone()))]);
+        if self.settings.compared {
+            circumstances.insert("same_stretch".to_owned(), Value::from(same));
+        }
         Ok(CaseLabel {
             case,
             family: planned.family,
+            compared: self.settings.compared,
             kind: planned.kind,
             effects: asked.into_iter().map(|setting| sealed(setting, None)).collect::<Result<_, _>>()?,
             without,
             race_pace: true,
-            contained: drive.contained.clone(),
-            circumstances: [("car".to_owned(), Value::from(drive.name.clone()))].into(),
+            // What both drives have is no change.
+            contained: if self.settings.compared { Vec::new() } else { drive.contained.clone() },
+            circumstances,
         })
+    }
+
+    /// The file of a case's other drive.
+    fn other_file(&self) -> &'static str {
+        if self.settings.compared { files::EARLIER } else { files::HELD_OUT }
     }
 }
 

@@ -119,6 +119,9 @@ pub struct CaseLabel {
     pub case: String,
     /// Who drove.
     pub family: Family,
+    /// Whether an earlier drive of the car, without the effects, is there to compare with.
+    #[serde(default)]
+    pub compared: bool,
     /// What it tests.
     pub kind: Kind,
     /// The effects, none to two.

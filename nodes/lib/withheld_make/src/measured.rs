@@ -152,10 +152,11 @@ impl MeasuredDrive {
         steps.get(steps.len() / 2).map_or(0.0, |step| *step as f64 / gripsight_signals::NS_PER_S)
     }
 
-    /// Two stretches of the drive that do not overlap, with effects put in.
+    /// Two stretches of the drive, each with its effects put in; they do not overlap, or are one and the `same`.
     pub(crate) fn stretches(
         &self,
-        effects: &[Effect],
+        effects: [&[Effect]; 2],
+        same: bool,
         duration_s: f64,
         random: &mut ChaCha8Rng,
     ) -> Result<[Vec<Measurement>; 2], WithheldError> {
@@ -172,12 +173,15 @@ impl MeasuredDrive {
         }
         let early = first + margin_ns + random.random_range(0..=spare_ns / 2);
         let late = early + ns(duration_s) + margin_ns + random.random_range(0..=spare_ns / 2);
-        let changed = injected(&self.measurements, effects);
-        let mut both = [early, late].map(|from| cut(&changed, from, duration_s));
+        let mut from = [early, late];
         if random.random_bool(0.5) {
-            both.reverse();
+            from.reverse();
         }
-        Ok(both)
+        if same {
+            from[1] = from[0];
+        }
+        let stretch = |i: usize| cut(&injected(&self.measurements, effects[i]), from[i], duration_s);
+        Ok([stretch(0), stretch(1)])
     }
 }
 

@@ -206,6 +206,7 @@ pub(crate) fn pair(
         return Ok(CaseLabel {
             case,
             family: Family::Simulator,
+            compared: false,
             kind: planned.kind,
             effects,
             without: Vec::new(),

@@ -51,6 +51,18 @@ pub(crate) fn measured(
     planned(family, &counts, cases, (&injectable(), &[]), sources, random)
 }
 
+/// Comparisons: half of them of a car that nothing was done to, so that false alarms show; of the rest a fifth with two effects, else one.
+pub(crate) fn compared(
+    family: Family,
+    cases: usize,
+    names: &[&'static str],
+    sources: usize,
+    random: &mut ChaCha8Rng,
+) -> Vec<Planned> {
+    let counts = [(Kind::None, cases.div_ceil(2)), (Kind::Pair, cases / 10), (Kind::Single, cases)];
+    planned(family, &counts, cases, (names, &[]), sources, random)
+}
+
 /// Pairs of simulator and car: half unchanged, a tenth with a structure that the simulator lacks, a tenth with two changes, the rest
 /// with one; `simulators` in turn.
 pub(crate) fn pairs(cases: usize, simulators: usize, random: &mut ChaCha8Rng) -> Vec<Planned> {
@@ -117,6 +129,14 @@ mod tests {
         assert!(plan.iter().all(
             |p| p.effects.len() == usize::from(p.kind != Kind::None) + usize::from(p.kind == Kind::Pair)
         ));
+    }
+
+    #[test]
+    fn half_of_the_comparisons_are_of_an_unchanged_car() {
+        let plan = compared(Family::Recorded, 40, &injectable(), 4, &mut ChaCha8Rng::seed_from_u64(1));
+        let count = |kind| plan.iter().filter(|p| p.kind == kind).count();
+        assert_eq!(Kind::ALL.map(count), [20, 16, 4, 0, 0]);
+        assert!((0..4).all(|s| plan.iter().filter(|p| p.source == s).count() == 10));
     }
 
     #[test]

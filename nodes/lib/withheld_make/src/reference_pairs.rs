@@ -159,6 +159,7 @@ pub(crate) fn pair(
         return Ok(CaseLabel {
             case,
             family: Family::Simulator,
+            compared: false,
             kind: planned.kind,
             effects: effects.collect(),
             without: Vec::new(),

@@ -21,6 +21,7 @@ fn settings(seed: u64) -> BatchSettings {
         foreign: None,
         recorded: None,
         simulators: None,
+        compared: false,
     }
 }
 
@@ -81,6 +82,20 @@ fn a_batch_is_repeatable_sealed_and_silent_and_says_what_drives_show() {
     fs::write(&sealed, text.replacen("\"none\"", "\"pair\"", 1)).unwrap();
     let refused = Labels::open(&sealed, folder.path());
     assert!(matches!(refused, Err(WithheldError::Tampered { .. })), "{refused:?}");
+}
+
+#[test]
+fn a_comparison_has_an_earlier_drive_without_what_is_to_be_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let batch = Batch::new(BatchSettings { cases: 4, compared: true, ..settings(11) }).unwrap();
+    let labels: Vec<CaseLabel> = (0..batch.len()).map(|i| batch.make(i, folder.path()).unwrap()).collect();
+    assert_eq!(labels.iter().filter(|l| l.kind == Kind::None).count(), 2);
+    for label in &labels {
+        let case = folder.path().join(&label.case);
+        assert!(label.compared && label.contained.is_empty());
+        assert!(case.join(files::EARLIER).is_file() && !case.join(files::HELD_OUT).exists());
+        assert_ne!(fs::read(case.join(files::EARLIER)).unwrap(), fs::read(case.join(files::BAG)).unwrap());
+    }
 }
 
 #[test]

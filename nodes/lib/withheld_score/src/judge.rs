@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use gripsight_withheld_make::{CaseLabel, Family, Kind, SealedEffect};
+use gripsight_model::EffectId;
+use gripsight_withheld_make::{CaseLabel, Family, Kind, SealedEffect, sizing_parameter};
 use serde::{Deserialize, Serialize};
 
 use crate::targets::Targets;
-use crate::verdict::{Said, SaidEffect};
+use crate::verdict::{Said, SaidChange, SaidEffect};
 
 /// A case with what was said of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -41,6 +42,8 @@ pub struct SizeCheck {
     pub covered: bool,
 }
 
+/// Probability from which a site is blamed: likelier than not.
+const LIKELY: f64 = 0.5;
 /// Verdicts that say that nothing has to be named.
 const NOTHING: [&str; 2] = ["no_gap", "tire_retune_only"];
 /// Effects that a retune of the tires answers as well.
@@ -105,10 +108,27 @@ impl Answer {
                 .is_some_and(|e| e.name == truth.name || e.confused_with.contains(&truth.name))
     }
 
-    /// Whether something is named where nothing is.
+    /// Whether something is named where nothing is; where drives are compared, whether anything is said to have changed.
     #[must_use]
     pub fn false_alarm(&self) -> bool {
-        self.label.kind == Kind::None && self.names().next().is_some()
+        let said =
+            if self.label.compared { self.said.verdict != "no_gap" } else { self.names().next().is_some() };
+        self.label.kind == Kind::None && said
+    }
+
+    /// Whether something is likelier than not the matter, or has likelier than not changed, at a site of the first effect.
+    #[must_use]
+    pub fn site_right(&self) -> bool {
+        let Some(effect) = self.label.effects.first().and_then(|e| EffectId::by_name(&e.name)) else {
+            return false;
+        };
+        let at = |site: &str| effect.spec().sites.iter().any(|s| s.name() == site);
+        let likely = |probability: Option<f64>| probability.is_some_and(|p| p >= LIKELY);
+        if self.label.compared {
+            self.said.changes.iter().any(|c| at(&c.site) && likely(c.probability))
+        } else {
+            self.said.sites.iter().any(|s| at(&s.name) && likely(s.probability))
+        }
     }
 
     /// Whether it says that the library does not have the cause.
@@ -133,6 +153,7 @@ impl Answer {
     #[must_use]
     pub fn right(&self) -> bool {
         match self.label.kind {
+            Kind::None if self.label.compared => !self.false_alarm(),
             Kind::None => {
                 NOTHING.contains(&self.said.verdict.as_str()) || !self.false_alarm() && !self.abstained()
             }
@@ -151,7 +172,11 @@ impl Answer {
         let checked = |truth: &SealedEffect| {
             let said = self.said.accepted().find(|e| e.name == truth.name)?;
             let contained = self.label.contained.contains(&truth.name);
-            (!contained).then(|| sizes(truth, said))
+            let change = self.said.changes.iter().find(|c| self.label.compared && c.name == truth.name);
+            (!contained).then(|| match change {
+                Some(change) => difference(truth, change).into_iter().collect(),
+                None => sizes(truth, said),
+            })
         };
         self.label.effects.iter().filter_map(checked).flatten().collect()
     }
@@ -174,11 +199,28 @@ impl Answer {
     }
 }
 
+/// A change of the first parameter beside the true one.
+fn difference(truth: &SealedEffect, change: &SaidChange) -> Option<SizeCheck> {
+    let (parameter, mechanism) = sizing_parameter(truth)?;
+    let null = if parameter == "ratio" { 1.0 } else { 0.0 };
+    let size = truth.library_parameters.get(parameter)? - null;
+    let (low, high) = change.difference.low.zip(change.difference.high)?;
+    Some(SizeCheck {
+        effect: truth.name.clone(),
+        parameter: parameter.to_owned(),
+        truth: size,
+        mechanism: mechanism - null,
+        value: change.difference.value?,
+        covered: (low..=high).contains(&size),
+    })
+}
+
 /// What is named in a recorded drive without anything put in, is the drive's own: adds it to what every case of the same drive contains.
 pub fn excuse_what_drives_have(answers: &mut [Answer]) {
     let drive = |a: &Answer| a.label.circumstances.get("car").cloned();
     let mut own: Vec<(Option<serde_json::Value>, String)> = Vec::new();
-    for a in answers.iter().filter(|a| a.label.family == Family::Recorded && a.label.kind == Kind::None) {
+    let untouched = |a: &&Answer| a.label.kind == Kind::None && !a.label.compared;
+    for a in answers.iter().filter(|a| a.label.family == Family::Recorded).filter(untouched) {
         own.extend(a.said.names().map(|name| (drive(a), name.to_owned())));
     }
     for answer in answers.iter_mut().filter(|a| a.label.family == Family::Recorded) {

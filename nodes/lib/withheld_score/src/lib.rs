@@ -23,4 +23,6 @@ pub use pairs::{PairRow, PairScores};
 pub use rate::{Rate, median};
 pub use scores::{EffectScore, FamilyScore, Miss, SEVERITY_BANDS, Scores};
 pub use targets::Targets;
-pub use verdict::{Figure, OtherDrive, Said, SaidEffect, SaidGap, SaidParameter, SaidPatch};
+pub use verdict::{
+    Figure, OtherDrive, Said, SaidChange, SaidEffect, SaidGap, SaidParameter, SaidPatch, SaidSite,
+};

@@ -50,6 +50,7 @@ pub(crate) fn lines(scope: &[&Answer], own: &[&Answer], calibration: &Calibratio
     };
     let errors = sizes.iter().map(|s| ((s.value - s.truth) / s.truth).abs()).collect();
     vec![
+        at_least("one effect: its site blamed", Rate::count(&singles, |a| a.site_right()), t.site),
         at_least("one effect: first name exact", Rate::count(&singles, |a| a.exact()), t.exact),
         at_least(
             "one effect: first name within its group",

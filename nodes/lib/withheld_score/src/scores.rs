@@ -150,7 +150,7 @@ fn family_score(family: Family, own: &[&Answer], targets: &Targets) -> FamilySco
         *row.entry(answer.first().to_owned()).or_default() += 1;
     }
     let mut lines = lines(&scope, own, &calibration, targets);
-    if family == Family::Recorded {
+    if family == Family::Recorded && own.iter().any(|a| !a.label.compared) {
         // What a recorded car has of its own nobody knows: nothing named there is known to be false.
         lines.retain(|line| !line.what.starts_with("no effect"));
     }

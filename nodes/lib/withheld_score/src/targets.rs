@@ -13,6 +13,8 @@ pub struct Targets {
     pub least_excess: f64,
     /// Stated confidence from which a name counts as confident.
     pub confident: f64,
+    /// Site blamed, at least.
+    pub site: f64,
     /// First name exact, at least.
     pub exact: f64,
     /// First name within its group, at least.

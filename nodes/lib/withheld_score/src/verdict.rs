@@ -30,6 +30,28 @@ pub struct SaidEffect {
     pub confused_with: Vec<String>,
 }
 
+/// A change between two drives.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SaidChange {
+    /// Canonical name of its site.
+    pub site: String,
+    /// Canonical name of the effect; `tires`; `other`.
+    pub name: String,
+    /// By how much.
+    pub difference: SaidParameter,
+    /// Chance that it has changed.
+    pub probability: Option<f64>,
+}
+
+/// A site in the graded answer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SaidSite {
+    /// Canonical name.
+    pub name: String,
+    /// Chance that something is the matter there.
+    pub probability: Option<f64>,
+}
+
 /// A figure of the budget.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Figure {
@@ -79,6 +101,12 @@ pub struct Said {
     /// Effects, best first.
     #[serde(default)]
     pub effects: Vec<SaidEffect>,
+    /// What has changed since an earlier drive.
+    #[serde(default)]
+    pub changes: Vec<SaidChange>,
+    /// The sites.
+    #[serde(default)]
+    pub sites: Vec<SaidSite>,
     /// The gap.
     #[serde(default)]
     pub gap: SaidGap,

@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 
 use gripsight_withheld_make::{CaseLabel, Family, Kind, OracleFit, SealedEffect};
 use gripsight_withheld_score::{
-    Answer, Figure, Line, OtherDrive, PairScores, Said, SaidEffect, SaidGap, SaidParameter, SaidPatch,
-    Scores, Targets, excuse_what_drives_have,
+    Answer, Figure, Line, OtherDrive, PairScores, Said, SaidChange, SaidEffect, SaidGap, SaidParameter,
+    SaidPatch, Scores, Targets, excuse_what_drives_have,
 };
 
 fn effect(name: &str, severity: f64, excess: f64) -> SealedEffect {
@@ -48,6 +48,7 @@ fn answer(kind: Kind, effects: Vec<SealedEffect>, verdict: &str, said: Vec<SaidE
     let label = CaseLabel {
         case: "case".to_owned(),
         family: Family::Reference,
+        compared: false,
         kind,
         effects,
         without: Vec::new(),
@@ -55,12 +56,62 @@ fn answer(kind: Kind, effects: Vec<SealedEffect>, verdict: &str, said: Vec<SaidE
         contained: Vec::new(),
         circumstances: BTreeMap::new(),
     };
-    let said = Said { verdict: verdict.to_owned(), effects: said, gap, other_drive: None, patch: None };
+    let said = Said {
+        verdict: verdict.to_owned(),
+        effects: said,
+        changes: Vec::new(),
+        sites: Vec::new(),
+        gap,
+        other_drive: None,
+        patch: None,
+    };
     Answer { label, said, oracle: None, baselines: BTreeMap::new(), time_s: 1.0 }
 }
 
 fn line<'a>(scores: &'a Scores, start: &str) -> &'a Line {
     scores.families[0].lines.iter().find(|l| l.what.starts_with(start)).unwrap()
+}
+
+#[test]
+fn a_comparison_is_judged_by_what_has_changed() {
+    let compared = |kind, effects, verdict: &str, changes: Vec<SaidChange>| {
+        let said = changes.iter().map(|c| named(&c.name, 0.9, &[])).collect();
+        let mut out = answer(kind, effects, verdict, said);
+        out.label.compared = true;
+        out.said.changes = changes;
+        out
+    };
+    let change = |value: f64| SaidChange {
+        site: "yaw_rate".to_owned(),
+        name: "gyro_bias".to_owned(),
+        difference: SaidParameter { value: Some(value), low: Some(value - 0.01), high: Some(value + 0.01) },
+        probability: Some(0.9),
+    };
+    let bias = || SealedEffect {
+        name: "gyro_bias".to_owned(),
+        parameters: [("bias_radps".to_owned(), 0.02)].into(),
+        library_parameters: [("bias_radps".to_owned(), 0.02)].into(),
+        oracle: None,
+    };
+    let answers = [
+        // Other tires, and what nobody can name, are changes, too.
+        compared(Kind::None, vec![], "tire_retune_only", vec![]),
+        compared(Kind::None, vec![], "none_of_these", vec![]),
+        compared(Kind::None, vec![], "no_gap", vec![]),
+        compared(Kind::Single, vec![bias()], "effects", vec![change(0.025)]),
+        compared(Kind::Single, vec![bias()], "effects", vec![change(0.05)]),
+        compared(Kind::Single, vec![bias()], "no_gap", vec![]),
+    ];
+    let scores = Scores::of(&answers, BTreeMap::new(), Targets::fixed().unwrap());
+    let rate = |start: &str| {
+        let rate = line(&scores, start).rate.unwrap();
+        (rate.hits, rate.of)
+    };
+    assert_eq!(rate("no effect"), (2, 3));
+    assert_eq!(rate("one effect: its site"), (2, 3));
+    assert_eq!(rate("one effect: first name exact"), (2, 3));
+    // The difference, not the size of the later drive.
+    assert_eq!(rate("90 % intervals"), (1, 2));
 }
 
 #[test]
