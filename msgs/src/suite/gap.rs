@@ -94,13 +94,13 @@ pub struct GapReport {
     pub gap_closed_fraction: Interval,
     /// Length of the rollouts (s).
     pub horizon_s: f64,
-    /// Front tires fitted without an effect.
+    /// Front tires (Phi_p, over the slips driven) fitted without an effect.
     pub front_without_effect: MagicFormula,
-    /// Rear tires fitted without an effect.
+    /// Rear tires likewise.
     pub rear_without_effect: MagicFormula,
-    /// Front tires fitted together with the accepted effects.
+    /// Front tires (Phi_p) fitted together with the accepted effects.
     pub front_with_effect: MagicFormula,
-    /// Rear tires fitted together with the accepted effects.
+    /// Rear tires likewise.
     pub rear_with_effect: MagicFormula,
     /// What is wrong with the data.
     pub data_health: Vec<String>,

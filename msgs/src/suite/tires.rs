@@ -135,7 +135,7 @@ pub struct TirePosterior {
     pub handshake: Handshake,
     /// accepted, accepted_within, provisional or rejected: that of the run's set; what these tires are worth says their covariance.
     pub status: String,
-    /// front.b ... rear.e of the Magic Formula; effect.parameter of what every car has a little of.
+    /// front.stiffness (B C D, over load), front.c, .d, .e of the Magic Formula, rear likewise; effect.parameter of what every car has a little of.
     pub names: Vec<String>,
     /// Unit of each.
     pub units: Vec<String>,

@@ -50,13 +50,14 @@ pub(crate) fn report(
 
 /// What a controller takes of it: the effects that the verdict names.
 pub(crate) fn extended_model(diagnosis: &Diagnosis, report: &GapReport) -> ExtendedModel {
+    let tires = &diagnosis.extended_model.tires;
     ExtendedModel {
         header: report.header.clone(),
         handshake: report.handshake.clone(),
         verdict: report.verdict.clone(),
         effects: diagnosis.effects.iter().filter(|e| e.accepted).map(effect).collect(),
-        front: report.front_with_effect,
-        rear: report.rear_with_effect,
+        front: formula(&tires.front),
+        rear: formula(&tires.rear),
     }
 }
 

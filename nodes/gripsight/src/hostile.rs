@@ -5,7 +5,7 @@ use std::path::Path;
 
 use gripsight_identification::SignalCorrections;
 use gripsight_mutants::{Mutants, bombs, peak_memory_mb};
-use gripsight_vehicle::{PacejkaParameters, PosteriorParameter, VehicleParameters};
+use gripsight_vehicle::{OwnTires, PacejkaParameters, PosteriorParameter, VehicleParameters};
 use serde_json::{Value, json};
 
 use crate::friction::calibrate::friction_found;
@@ -39,7 +39,7 @@ fn identification() -> Value {
 }
 
 fn posterior() -> Value {
-    let parameters = PosteriorParameter::of_tires(&tires());
+    let parameters = PosteriorParameter::of_tires(&OwnTires::assumed(&tires()));
     let covariance = vec![vec![0.01; parameters.len()]; parameters.len()];
     json!({"status": "accepted", "vehicle_hash": "c0ffee", "parameters": parameters, "covariance": covariance, "data": ["a", "b"]})
 }
@@ -98,7 +98,7 @@ fn a_mutated_identification_is_answered_by_all_that_read_it() {
     });
     assert_answered(name, &text, |_, path| verify::read_set(path).inspect(|(tires, _)| assert_tires(tires)));
     assert_answered(name, &text, |folder, _| {
-        export::car(folder).inspect(|(car, _)| assert_tires(&car.tires))
+        export::car(folder).inspect(|(car, _)| assert_tires(&car.tires.assumed_effective()))
     });
     assert_answered(name, &text, |folder, _| friction_found(folder));
 }

@@ -8,7 +8,7 @@ use gripsight_diagnosis::ExtendedModelFile;
 use gripsight_identification::export::{checked_tires, read_text};
 use gripsight_identification::{Nuisance, SignalCorrections, Status};
 use gripsight_model::{CarFile, EffectId, OutsideTerm};
-use gripsight_vehicle::{PacejkaParameters, TirePosterior, VehicleParameters};
+use gripsight_vehicle::{OwnTires, PacejkaParameters, TirePosterior, VehicleParameters};
 use serde::Deserialize;
 
 const POSTERIOR: &str = "posterior.json";
@@ -57,7 +57,8 @@ pub(crate) fn car(result: &Path) -> anyhow::Result<(CarFile, bool)> {
     let Identified { vehicle, found, signals, nuisance, .. } = identified;
     let vehicle = vehicle.checked().with_context(|| of("identification.json"))?;
     if !result.join(POSTERIOR).is_file() {
-        let tires = checked_tires(found).with_context(|| of("identification.json"))?;
+        let found = checked_tires(found).with_context(|| of("identification.json"))?;
+        let tires = OwnTires::assumed(&found);
         return Ok((CarFile { vehicle, tires, effects: effects_of(&signals, nuisance.relaxation_m) }, false));
     }
     let posterior = crate::diagnose::posterior(&result.join(POSTERIOR))?;
@@ -122,7 +123,7 @@ mod tests {
 
     #[test]
     fn what_own_tires_have_taken_on_is_not_counted_twice() {
-        let tires = PacejkaParameters::from_array([9.0, 1.5, 1.0, 0.1, 8.0, 1.4, 0.9, -0.2]);
+        let tires = OwnTires::from_parameters(&[9.0, 1.5, 1.0, 0.1, 8.0, 1.4, 0.9, -0.2]);
         let mut parameters = PosteriorParameter::of_tires(&tires);
         let relaxation = EffectId::of_outside(OutsideTerm::Relaxation).unwrap().spec();
         let name = format!("{}.{}", relaxation.name, relaxation.parameters[0].name);
@@ -162,7 +163,7 @@ mod tests {
             SignalCorrections { steering_delay_s: 0.04, steering_gain: 0.9, ..SignalCorrections::NONE };
         let car = CarFile {
             vehicle: VehicleParameters::f1tenth(),
-            tires: PacejkaParameters::from_array([9.0, 1.5, 1.0, 0.1, 8.0, 1.4, 0.9, -0.2]),
+            tires: OwnTires::from_parameters(&[9.0, 1.5, 1.0, 0.1, 8.0, 1.4, 0.9, -0.2]),
             effects: effects_of(&signals, 0.05),
         };
         assert_eq!(car.effects().unwrap().len(), 3);

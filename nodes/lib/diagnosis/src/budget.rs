@@ -126,7 +126,7 @@ impl Budget {
                 Some((*effect, closed(steps.last()?, &error, &retuned)))
             })
             .collect();
-        let slip = large_slip_rad(engine, null, &windows.training);
+        let slip = large_slip_rad(engine, &windows.training);
         let flexible = Flexible::new(engine.recording, slip, engine.vehicle.wheelbase_m(), &Site::ALL);
         let (ceiling, residual) = rayon::join(
             || engine.fit_flexible(state, &flexible, &windows.training),
@@ -217,17 +217,12 @@ fn closed(from: &[(f64, f64)], to: &[(f64, f64)], retuned: &[(f64, f64)]) -> Est
 }
 
 /// A large slip angle of the recording on the fitted tires.
-pub(crate) fn large_slip_rad(engine: &Engine<'_>, null: &State, windows: &Windows) -> f64 {
-    let car = gripsight_vehicle::SingleTrack::new(engine.vehicle, &null.tires());
+pub(crate) fn large_slip_rad(engine: &Engine<'_>, windows: &Windows) -> f64 {
     let mut slips = Vec::new();
     for w in &windows.windows {
         let run = &engine.recording.runs[w.segment];
         for k in (w.from..w.from + w.len).step_by(5) {
-            let state =
-                gripsight_vehicle::State { v_y_mps: run.smooth[0][k], yaw_rate_radps: run.smooth[1][k] };
-            let input =
-                gripsight_vehicle::Input { v_x_mps: run.v_x_mps[k], steering_rad: run.steering_rad[k] };
-            let (f, r) = car.slip_angles_rad(&state, &input);
+            let [f, r] = engine.slip_rad(run, k);
             slips.push(f.abs().max(r.abs()));
         }
     }

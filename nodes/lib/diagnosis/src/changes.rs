@@ -9,7 +9,7 @@
 //! ```
 
 use gripsight_estimation::selection::{ColumnPrior, Quadratic, Selection, Term, configuration, select};
-use gripsight_model::{BASE, EffectId, Site, TIRES, tires_to_parameters};
+use gripsight_model::{BASE, EffectId, Site, TIRES};
 use nalgebra::{DMatrix, DVector};
 
 use crate::decisions;
@@ -106,7 +106,7 @@ fn differences(engine: &Engine<'_>, earlier: &Inferred) -> Vec<Term> {
     let unbounded = [f64::NEG_INFINITY, f64::INFINITY];
     let weights = || vec![(1.0 - decisions::PRIOR).ln(), decisions::PRIOR.ln()];
     let same = TireTrust::drive();
-    let mean = tires_to_parameters(&engine.nominal);
+    let mean = engine.nominal.to_parameters();
     let tires = (0..TIRES)
         .map(|j| {
             let sigma = match j % 4 {

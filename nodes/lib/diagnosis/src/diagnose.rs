@@ -3,7 +3,7 @@
 use gripsight_estimation::{Windows, split};
 use gripsight_model::{EffectId, Flexible, HOLD, Need, Recording, Site};
 use gripsight_signals::{DataHealth, StateSequence};
-use gripsight_vehicle::{PacejkaParameters, TirePosterior, VehicleParameters};
+use gripsight_vehicle::{OwnTires, PacejkaParameters, TirePosterior, VehicleParameters};
 
 use crate::budget::{Budget, CANDIDATES, Models, Scorer, large_slip_rad};
 use crate::engine::Engine;
@@ -32,7 +32,7 @@ pub struct Request<'a> {
     pub together: Option<Together<'a>>,
     /// The car as the model has it.
     pub vehicle: &'a VehicleParameters,
-    /// The tires as the model has them, and trusted to a few percent; `None`: identified from the training blocks.
+    /// The effective tires of a file, taken for the car's own and trusted to a few percent; `None`: identified from the training blocks.
     pub tires: Option<PacejkaParameters>,
     /// The car's own tires from another drive, or from this one, where they are but a place to start from; in place of `tires`.
     pub posterior: Option<&'a TirePosterior>,
@@ -68,8 +68,8 @@ impl<'a> Request<'a> {
     }
 
     /// The tires to start from, if any.
-    pub(crate) fn given_tires(&self) -> Option<PacejkaParameters> {
-        self.given_model().map(|m| m.tires).or(self.tires)
+    pub(crate) fn given_tires(&self) -> Option<OwnTires> {
+        self.given_model().map(|m| m.tires).or(self.tires.as_ref().map(OwnTires::assumed))
     }
 }
 
@@ -140,7 +140,7 @@ pub(crate) fn explain(
     let first = fitted_null(&engine, &search_windows)?;
     let (inferred, differences) = match request.earlier {
         None => {
-            let slip_rad = large_slip_rad(&engine, &first, &search_windows);
+            let slip_rad = large_slip_rad(&engine, &search_windows);
             let wheelbase_m = request.vehicle.wheelbase_m();
             let flexible = Flexible::new(&recording, slip_rad, wheelbase_m, &Site::ALL);
             let scorer = Scorer::new(&engine.clone(), other.as_ref(), &windows);
@@ -195,7 +195,21 @@ pub(crate) fn explain(
     let scored_windows =
         if windows.held_out.windows.is_empty() { &windows.training } else { &windows.held_out };
     let on_all = split(&recording, false).training;
+    let slips_rad = pictures::slips(&engine, &on_all);
+    let tires = TirePair {
+        without_effect: engine.effective_tires(&null, slips_rad),
+        with_effect: engine.effective_tires(&model, slips_rad),
+    };
     let nominal_score = engine.score(&nominal.effects, None, &nominal.parameters, &on_all);
+    let series = pictures::series(
+        &engine,
+        &nominal,
+        [&null, &model],
+        (&tires, slips_rad),
+        &on_all,
+        &nominal_score,
+        scored_windows,
+    );
     let diagnosis = Diagnosis {
         verdict,
         reasons,
@@ -211,11 +225,11 @@ pub(crate) fn explain(
         identities: recording.identities.clone(),
         gap: budget.stated(&recording),
         gap_closed_fraction: budget.closed,
-        tires: TirePair { without_effect: null.tires(), with_effect: model.tires() },
+        tires,
         extended_model: ExtendedModelFile::of(&engine, &model),
         data_health,
         inference: Some(Inference { rounds: inferred.rounds, dispersion: inferred.dispersion }),
-        series: pictures::series(&engine, &nominal, &null, &model, &on_all, &nominal_score, scored_windows),
+        series,
     };
     Ok((diagnosis, inferred))
 }
@@ -243,7 +257,7 @@ pub(crate) fn fit_tires(
     recording: &Recording,
     vehicle: &VehicleParameters,
     windows: &Windows,
-) -> Result<PacejkaParameters, GapError> {
+) -> Result<OwnTires, GapError> {
     const FIRST: usize = 8;
     const REST: usize = 17;
     let windows = windows.thinned(SEARCH_WINDOWS);
@@ -251,7 +265,7 @@ pub(crate) fn fit_tires(
         .iter()
         .map(|&start| {
             let engine =
-                Engine::new(recording, vehicle, PacejkaParameters::from_array(start), TireTrust::free());
+                Engine::new(recording, vehicle, OwnTires::from_parameters(&start), TireTrust::free());
             let state = engine.fit(&[], &engine.blank(), None, &windows, FIRST);
             (engine, state)
         })

@@ -4,9 +4,12 @@ use gripsight_estimation::shooting;
 use gripsight_estimation::shooting::{Parameter, Problem, StopReason};
 use gripsight_estimation::{Score, Windows};
 use gripsight_model::{
-    BASE, EffectId, ExtendedModel, Flexible, ParameterSpec, Recording, Window, tires_to_parameters,
+    BASE, DrivenCar, EffectId, ExtendedModel, Flexible, ParameterSpec, Recording, Run, Window,
+    effective_tires,
 };
-use gripsight_vehicle::{PacejkaParameters, VehicleParameters, handling};
+use gripsight_vehicle::{
+    Input, OwnTires, PacejkaParameters, SingleTrack, State as Motion, VehicleParameters, handling,
+};
 
 use crate::state::{Nominal, State};
 use crate::trust::TireTrust;
@@ -28,7 +31,7 @@ pub(crate) type Sized = Vec<(EffectId, Vec<f64>)>;
 pub(crate) struct Engine<'a> {
     pub(crate) recording: &'a Recording,
     pub(crate) vehicle: &'a VehicleParameters,
-    pub(crate) nominal: PacejkaParameters,
+    pub(crate) nominal: OwnTires,
     /// Effects that the nominal model has: held at their sizes until they are claimed.
     pub(crate) held: Sized,
     /// What the nominal model has of the background.
@@ -42,11 +45,11 @@ pub(crate) struct Engine<'a> {
 }
 
 /// How long a substep may be: a share of the fastest time constant of the car.
-fn substep_s(vehicle: &VehicleParameters, tires: &PacejkaParameters, v_x_mps: f64) -> f64 {
+fn substep_s(vehicle: &VehicleParameters, tires: &OwnTires, v_x_mps: f64) -> f64 {
     const LONGEST_S: f64 = 0.005;
     const SHORTEST_S: f64 = 0.002;
     const SHARE: f64 = 0.12;
-    let (k_f, k_r) = handling::cornering_stiffness_n_per_rad(vehicle, tires);
+    let (k_f, k_r) = handling::cornering_stiffness_n_per_rad(vehicle, &tires.assumed_effective());
     let (l_f, l_r) = (vehicle.l_f_m, vehicle.l_r_m);
     let lateral = (k_f + k_r) / (vehicle.mass_kg * v_x_mps);
     let yaw = (k_f * l_f * l_f + k_r * l_r * l_r) / (vehicle.yaw_inertia_kgm2 * v_x_mps);
@@ -62,7 +65,7 @@ impl<'a> Engine<'a> {
     pub(crate) fn new(
         recording: &'a Recording,
         vehicle: &'a VehicleParameters,
-        nominal: PacejkaParameters,
+        nominal: OwnTires,
         trust: TireTrust,
     ) -> Self {
         let v_x_mps = recording.typical_speed_mps().max(0.5);
@@ -86,7 +89,7 @@ impl<'a> Engine<'a> {
 
     /// Tires and hold of the nominal model.
     pub(crate) fn nominal_base(&self) -> Vec<f64> {
-        let mut p = tires_to_parameters(&self.nominal).to_vec();
+        let mut p = self.nominal.to_parameters().to_vec();
         p.push(0.5 * self.recording.dt_s());
         p
     }
@@ -97,6 +100,30 @@ impl<'a> Engine<'a> {
         let given = || self.usual.iter().chain(&self.held);
         parameters.extend(given().flat_map(|(_, own)| own));
         Nominal { effects: given().map(|(e, _)| *e).collect(), parameters }
+    }
+
+    /// Slip angles of front and rear axle at a sample, of the motion as recorded; they ask for no tires.
+    pub(crate) fn slip_rad(&self, run: &Run, k: usize) -> [f64; 2] {
+        let car = SingleTrack::new(self.vehicle, &self.nominal.assumed_effective());
+        let state = Motion { v_y_mps: run.smooth[0][k], yaw_rate_radps: run.smooth[1][k] };
+        let input = Input { v_x_mps: run.v_x_mps[k], steering_rad: run.steering_rad[k] };
+        let (front, rear) = car.slip_angles_rad(&state, &input);
+        [front, rear]
+    }
+
+    /// Phi_p of a fitted model over the slips driven; not finite where the model does not get there.
+    pub(crate) fn effective_tires(&self, state: &State, slip_rad: [f64; 2]) -> PacejkaParameters {
+        let own = |e: &EffectId| state.of(*e).map(|own| (*e, own.to_vec()));
+        let car = DrivenCar {
+            vehicle: self.vehicle.clone(),
+            tires: state.tires(),
+            effects: state.effects.iter().filter_map(own).collect(),
+            substep_s: self.substep_s,
+            force_known: false,
+            on_course: false,
+        };
+        effective_tires(&car, self.recording.typical_speed_mps(), slip_rad)
+            .unwrap_or(PacejkaParameters::from_array([f64::NAN; 8]))
     }
 
     /// The parameters with which the nominal model has an effect, where it has it.

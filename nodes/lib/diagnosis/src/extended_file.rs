@@ -13,7 +13,7 @@
 use gripsight_model::EffectId;
 use std::collections::BTreeMap;
 
-use gripsight_vehicle::PacejkaParameters;
+use gripsight_vehicle::OwnTires;
 use serde::{Deserialize, Serialize};
 
 use crate::GapError;
@@ -26,7 +26,7 @@ use crate::state::State;
 #[serde(deny_unknown_fields)]
 pub struct ExtendedModelFile {
     /// Tires fitted together with the effects.
-    pub tires: PacejkaParameters,
+    pub tires: OwnTires,
     /// Parameters of every effect by name: a diagnosis holds them at these sizes until it finds others.
     pub effects: BTreeMap<String, BTreeMap<String, f64>>,
     /// What was fitted beside them of the effects that every car has a little of: a diagnosis starts there.
@@ -37,7 +37,7 @@ pub struct ExtendedModelFile {
 impl ExtendedModelFile {
     /// Tires alone.
     #[must_use]
-    pub fn of_tires(tires: PacejkaParameters) -> Self {
+    pub fn of_tires(tires: OwnTires) -> Self {
         Self { tires, effects: BTreeMap::new(), usual: BTreeMap::new() }
     }
 
@@ -109,7 +109,7 @@ mod tests {
             BTreeMap::from([(name.to_owned(), BTreeMap::from([(parameter.to_owned(), value)]))])
         };
         let file = ExtendedModelFile {
-            tires: PacejkaParameters::from_array([9.0, 1.5, 1.0, 0.1, 8.0, 1.4, 0.9, -0.2]),
+            tires: OwnTires::from_parameters(&[9.0, 1.5, 1.0, 0.1, 8.0, 1.4, 0.9, -0.2]),
             effects: of("tire_relaxation", "sigma_m", 0.45),
             usual: of("yaw_inertia_error", "ratio", 1.02),
         };

@@ -1,7 +1,7 @@
 //! The hypotheses: every effect and every flexible term, there or not, with the prior of its size in either case.
 
 use gripsight_estimation::selection::{ColumnPrior, Term};
-use gripsight_model::{EffectId, HOLD, Site, TIRES, tires_to_parameters};
+use gripsight_model::{EffectId, HOLD, Site, TIRES};
 
 use crate::columns::Columns;
 use crate::decisions;
@@ -15,7 +15,7 @@ pub(crate) fn terms(
     values: &[f64],
     library: &[EffectId],
 ) -> Vec<Term> {
-    let mean = tires_to_parameters(&engine.nominal);
+    let mean = engine.nominal.to_parameters();
     let trust = &engine.trust;
     let tires = (0..TIRES)
         .map(|j| {

@@ -2,7 +2,7 @@
 
 use gripsight_estimation::selection::{Selection, Term};
 use gripsight_model::{EffectId, Site};
-use gripsight_vehicle::PacejkaParameters;
+use gripsight_vehicle::OwnTires;
 
 use crate::columns::Columns;
 use crate::decisions;
@@ -16,7 +16,7 @@ use crate::statement::Statement;
 pub(crate) struct Inferred {
     pub(crate) columns: Columns,
     /// The tires that the priors are around.
-    pub(crate) tires: PacejkaParameters,
+    pub(crate) tires: OwnTires,
     /// Where everything was linearised last.
     pub(crate) values: Vec<f64>,
     pub(crate) selection: Selection,

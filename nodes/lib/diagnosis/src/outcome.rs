@@ -197,7 +197,8 @@ pub struct GapBudget {
     pub scored_on: &'static str,
 }
 
-/// Tires with and without the named effects.
+/// Phi_p with and without the named effects: the car's own tires projected on those of a bare single-track model (`effective_tires` of
+/// `gripsight_model`) over the slips driven. The own tires are in [`ExtendedModelFile`](crate::ExtendedModelFile).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TirePair {
     /// Fitted without any effect.

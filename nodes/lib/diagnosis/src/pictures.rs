@@ -1,7 +1,7 @@
 //! The points of the report's pictures.
 
 use crate::engine::Engine;
-use crate::outcome::{Prediction, Series};
+use crate::outcome::{Prediction, Series, TirePair};
 use crate::place::heat;
 use crate::state::{Nominal, State};
 use gripsight_estimation::{Score, Windows, by_block, mean, of_length};
@@ -14,16 +14,15 @@ const HORIZONS_S: [f64; 5] = [0.1, 0.2, 0.5, 1.0, 2.0];
 pub(crate) fn series(
     engine: &Engine<'_>,
     nominal: &Nominal,
-    null: &State,
-    state: &State,
+    [null, state]: [&State; 2],
+    (tires, slip_driven_rad): (&TirePair, [f64; 2]),
     all: &Windows,
     nominal_score: &Score,
     scored: &Windows,
 ) -> Series {
-    let slip_driven_rad = slips(engine, null, all);
     let predictions = predictions(engine, nominal, state, all, nominal_score);
     Series {
-        tire_curves: curves(null, state, slip_driven_rad),
+        tire_curves: curves(tires, slip_driven_rad),
         slip_driven_rad,
         worst: worst(engine, &predictions, all, nominal_score),
         predictions,
@@ -33,26 +32,22 @@ pub(crate) fn series(
     }
 }
 
-fn slips(engine: &Engine<'_>, null: &State, all: &Windows) -> [f64; 2] {
-    let car = gripsight_vehicle::SingleTrack::new(engine.vehicle, &null.tires());
+/// The largest slips driven, of front and rear axle.
+pub(crate) fn slips(engine: &Engine<'_>, all: &Windows) -> [f64; 2] {
     let mut most = [0.0_f64; 2];
     for w in &all.windows {
         let run = &engine.recording.runs[w.segment];
         for k in w.from..w.from + w.len {
-            let state =
-                gripsight_vehicle::State { v_y_mps: run.smooth[0][k], yaw_rate_radps: run.smooth[1][k] };
-            let input =
-                gripsight_vehicle::Input { v_x_mps: run.v_x_mps[k], steering_rad: run.steering_rad[k] };
-            let (f, r) = car.slip_angles_rad(&state, &input);
+            let [f, r] = engine.slip_rad(run, k);
             most = [most[0].max(f.abs()), most[1].max(r.abs())];
         }
     }
     most
 }
 
-fn curves(null: &State, state: &State, driven_rad: [f64; 2]) -> [Vec<[f64; 3]>; 2] {
+fn curves(tires: &TirePair, driven_rad: [f64; 2]) -> [Vec<[f64; 3]>; 2] {
     const POINTS: usize = 60;
-    let (without, with) = (null.tires(), state.tires());
+    let TirePair { without_effect: without, with_effect: with } = tires;
     let axle = |a: &gripsight_vehicle::MagicFormula, b: &gripsight_vehicle::MagicFormula, most: f64| {
         (0..=POINTS)
             .map(|k| {

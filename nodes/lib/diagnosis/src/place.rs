@@ -104,7 +104,6 @@ fn samples(
 ) -> Vec<Sample> {
     let recording = engine.recording;
     let model = engine.model(&nominal.effects, None);
-    let car = gripsight_vehicle::SingleTrack::new(engine.vehicle, &engine.nominal);
     let (l_f, l_r) = (engine.vehicle.l_f_m, engine.vehicle.l_r_m);
     let channels = recording.channels.len();
     let (mut predicted, mut measured) = (Vec::new(), Vec::new());
@@ -118,11 +117,7 @@ fn samples(
             let error = |c: usize| measured[k * channels + c] - predicted[k * channels + c];
             let (s_v, s_r) = (recording.sigma[0], recording.sigma[1]);
             let axle = |x: f64| (error(0) + x * error(1)).powi(2) / (s_v * s_v + x * x * s_r * s_r);
-            let state =
-                gripsight_vehicle::State { v_y_mps: run.smooth[0][at], yaw_rate_radps: run.smooth[1][at] };
-            let input =
-                gripsight_vehicle::Input { v_x_mps: run.v_x_mps[at], steering_rad: run.steering_rad[at] };
-            let (front, rear) = car.slip_angles_rad(&state, &input);
+            let [front, rear] = engine.slip_rad(run, at);
             let next = (at + 1).min(run.len() - 1);
             out.push(Sample {
                 values: [

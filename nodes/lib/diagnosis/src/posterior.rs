@@ -4,7 +4,7 @@ use gripsight_estimation::selection::Term;
 use gripsight_estimation::split;
 use gripsight_model::{BASE, EffectId, Flexible, Site, TIRES};
 use gripsight_signals::{DataHealth, StateSequence};
-use gripsight_vehicle::{PacejkaParameters, PosteriorParameter, TirePosterior, VehicleParameters};
+use gripsight_vehicle::{OwnTires, PacejkaParameters, PosteriorParameter, TirePosterior, VehicleParameters};
 
 use crate::around::Around;
 use crate::budget::large_slip_rad;
@@ -20,10 +20,10 @@ use crate::usable::{Usable, usable};
 use crate::{GapError, Request};
 
 /// Names of a tire's parameters, in the order of the fit.
-const TIRE: [&str; 4] = ["b", "c", "d", "e"];
+const TIRE: [&str; 4] = ["stiffness", "c", "d", "e"];
 const AXLES: [&str; 2] = ["front", "rear"];
 
-/// Fits the car's own tires to a drive. `start`: tires that are known to be near, or none: then from several. `status` and `vehicle_hash` of the
+/// Fits the car's own tires to a drive. `start`: effective tires that the drive has given, which are near, or none: then from several. `status` and `vehicle_hash` of the
 /// identification that they go along with.
 ///
 /// # Errors
@@ -36,13 +36,13 @@ pub fn own_tires(
 ) -> Result<TirePosterior, GapError> {
     let Usable { recording, windows } = usable(&Request::new(sequence, vehicle), &DataHealth::of(sequence)?)?;
     let tires = match start {
-        Some(tires) => tires,
+        Some(effective) => OwnTires::assumed(&effective),
         None => fit_tires(&recording, vehicle, &windows.training)?,
     };
     let mut engine = Engine::new(&recording, vehicle, tires, TireTrust::free());
     let windows = split(&recording, false).training.thinned(SEARCH_WINDOWS);
     let null = fitted_null(&engine, &windows)?;
-    let slip_rad = large_slip_rad(&engine, &null, &windows);
+    let slip_rad = large_slip_rad(&engine, &windows);
     let flexible = Flexible::new(&recording, slip_rad, vehicle.wheelbase_m(), &Site::ALL);
     let columns = Columns::new(EffectId::background().collect(), flexible);
     let mut values = columns.blank(&engine);
@@ -74,8 +74,7 @@ pub fn own_tires(
     // Tires and what every car has; how long a command is held is nobody's to inherit.
     let used: Vec<usize> = (0..TIRES).chain(BASE..columns.first_flexible()).collect();
     let covariance = own_covariance(&around, &weighed, &used).ok_or(GapError::NotFinite)?;
-    let tires = std::array::from_fn(|i| values[i]);
-    let mut parameters = PosteriorParameter::of_tires(&PacejkaParameters::from_array(tires));
+    let mut parameters = PosteriorParameter::of_tires(&OwnTires::from_parameters(&values[..TIRES]));
     for &effect in &columns.effects {
         parameters.extend(effect.spec().parameters.iter().map(|p| PosteriorParameter {
             name: format!("{}.{}", effect.name(), p.name),
@@ -113,14 +112,11 @@ pub(crate) fn trust(posterior: &TirePosterior) -> Result<TireTrust, GapError> {
             *place = posterior.place(&format!("{axle}.{p}"))?;
         }
         let mean = |i: usize| posterior.parameters[at[i]].mean;
-        let cov = |i: usize, j: usize| posterior.covariance[at[i]][at[j]];
-        // The stiffness is B C D.
-        let relative = |i: usize, j: usize| cov(i, j) / (mean(i) * mean(j));
-        let stiffness: f64 = (0..3).flat_map(|i| (0..3).map(move |j| relative(i, j))).sum();
-        trust.stiffness = trust.stiffness.max(stiffness.max(0.0).sqrt()).min(most.stiffness);
-        trust.peak = trust.peak.max(relative(2, 2).max(0.0).sqrt()).min(most.peak);
-        trust.shape = trust.shape.max(cov(1, 1).sqrt()).min(most.shape);
-        trust.curvature = trust.curvature.max(cov(3, 3).sqrt()).min(most.curvature);
+        let sigma = |i: usize| posterior.covariance[at[i]][at[i]].sqrt();
+        trust.stiffness = trust.stiffness.max(sigma(0) / mean(0)).min(most.stiffness);
+        trust.shape = trust.shape.max(sigma(1)).min(most.shape);
+        trust.peak = trust.peak.max(sigma(2) / mean(2)).min(most.peak);
+        trust.curvature = trust.curvature.max(sigma(3)).min(most.curvature);
     }
     Ok(trust)
 }
@@ -181,12 +177,10 @@ mod tests {
         let mut of = posterior();
         let known = trust(&of).unwrap();
         approx::assert_relative_eq!(known.peak, 0.05, epsilon = 1e-12);
-        approx::assert_relative_eq!(known.stiffness, 0.05 * 3.0_f64.sqrt(), epsilon = 1e-12);
-        // A stiffness that is known although B and D are not: they go against each other.
-        for (b, d) in [(0, 2), (4, 6)] {
-            (of.covariance[b][d], of.covariance[d][b]) = (-0.01, -0.01);
-        }
-        assert!(trust(&of).unwrap().stiffness < known.stiffness);
+        approx::assert_relative_eq!(known.stiffness, 0.05, epsilon = 1e-12);
+        // What an axle knows less well is what both are trusted by.
+        of.covariance[4][4] = 0.04;
+        approx::assert_relative_eq!(trust(&of).unwrap().stiffness, 0.1, epsilon = 1e-12);
         of.covariance.iter_mut().flatten().for_each(|c| *c = 0.0);
         assert_eq!(trust(&of).unwrap(), TireTrust::drive());
     }

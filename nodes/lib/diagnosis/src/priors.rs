@@ -1,7 +1,7 @@
 //! What is known beforehand: bounds and priors of all parameters.
 
 use gripsight_estimation::shooting::{Parameter, Prior};
-use gripsight_model::{EffectId, HOLD, TIRES, tires_to_parameters};
+use gripsight_model::{EffectId, HOLD, TIRES};
 
 use crate::engine::Engine;
 use crate::trust::TireTrust;
@@ -31,7 +31,7 @@ impl Engine<'_> {
         values: &[f64],
         ridge: f64,
     ) -> Vec<Parameter> {
-        let mean = tires_to_parameters(&self.nominal);
+        let mean = self.nominal.to_parameters();
         let trust = &self.trust;
         let tighter = if self.trust == TireTrust::free() { 1.0 } else { RESIDUALS_PER_OBSERVATION.sqrt() };
         let mut out: Vec<Parameter> = (0..TIRES)

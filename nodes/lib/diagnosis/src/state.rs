@@ -1,9 +1,9 @@
 //! A model with its parameters: as it was handed over, as it was fitted, as it was scored.
 
-use gripsight_model::{BASE, EffectId, TIRES, tires_from_parameters};
+use gripsight_model::{BASE, EffectId, TIRES};
 use std::ops::Range;
 
-use gripsight_vehicle::PacejkaParameters;
+use gripsight_vehicle::OwnTires;
 
 /// A model with its parameters fitted.
 #[derive(Debug, Clone)]
@@ -31,8 +31,8 @@ impl State {
         self.parameters.get(self.rows(effect))
     }
 
-    pub(crate) fn tires(&self) -> PacejkaParameters {
-        tires_from_parameters(&self.parameters[..TIRES])
+    pub(crate) fn tires(&self) -> OwnTires {
+        OwnTires::from_parameters(&self.parameters[..TIRES])
     }
 }
 

@@ -4,20 +4,22 @@
 
 use gripsight_model::Recording;
 use gripsight_signals::StateSequence;
-use gripsight_vehicle::{Input, PacejkaParameters, SingleTrack, State as Motion, VehicleParameters};
+use gripsight_vehicle::{
+    Input, OwnTires, PacejkaParameters, SingleTrack, State as Motion, VehicleParameters,
+};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
 const DT_S: f64 = 0.01;
 
-pub(crate) fn tires() -> PacejkaParameters {
-    PacejkaParameters::from_array([7.0, 1.5, 1.0, 0.1, 8.0, 1.4, 0.95, -0.2])
+pub(crate) fn tires() -> OwnTires {
+    OwnTires::assumed(&PacejkaParameters::from_array([7.0, 1.5, 1.0, 0.1, 8.0, 1.4, 0.95, -0.2]))
 }
 
 /// The nominal car's drive over wheels that follow the recorded command with a time constant.
 pub(crate) fn drive(vehicle: &VehicleParameters, lag_s: f64) -> Recording {
     const SAMPLES: usize = 2400;
-    let car = SingleTrack::new(vehicle, &tires());
+    let car = SingleTrack::new(vehicle, &tires().assumed_effective());
     let random = &mut rand_chacha::ChaCha8Rng::seed_from_u64(9);
     let mut noise = |size: f64| -> f64 {
         let normal: f64 = StandardNormal.sample(random);

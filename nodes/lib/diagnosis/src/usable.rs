@@ -3,7 +3,7 @@
 use gripsight_estimation::{Estimate, HORIZON_S, Split, split};
 use gripsight_model::{ModelError, NEEDED_S, Recording};
 use gripsight_signals::DataHealth;
-use gripsight_vehicle::PacejkaParameters;
+use gripsight_vehicle::{OwnTires, PacejkaParameters};
 
 use crate::outcome::{Diagnosis, GapBudget, Series, TirePair, Verdict, Where};
 use crate::{ExtendedModelFile, GapError, Request};
@@ -61,7 +61,8 @@ pub(crate) fn refused(request: &Request<'_>, error: &GapError, data_health: Data
             "corners to both sides, up to half of the grip or more, with v_y, yaw rate and steering recorded"
         }
     };
-    let tires = request.given_tires().unwrap_or(PacejkaParameters::from_array([f64::NAN; 8]));
+    let effective = request.tires.unwrap_or(PacejkaParameters::from_array([f64::NAN; 8]));
+    let tires = request.given_tires().unwrap_or(OwnTires::from_parameters(&[f64::NAN; 8]));
     let unknown = Estimate::UNKNOWN;
     Diagnosis {
         verdict: Verdict::NotIdentifiable,
@@ -88,7 +89,7 @@ pub(crate) fn refused(request: &Request<'_>, error: &GapError, data_health: Data
             scored_on: "nothing",
         },
         gap_closed_fraction: unknown,
-        tires: TirePair { without_effect: tires, with_effect: tires },
+        tires: TirePair { without_effect: effective, with_effect: effective },
         extended_model: request.model.cloned().unwrap_or_else(|| ExtendedModelFile::of_tires(tires)),
         data_health,
         drive_next: vec![next.to_owned()],

@@ -330,6 +330,7 @@ fn corrections(c: &msg::SignalCorrections) -> SignalCorrections {
 mod tests {
     use super::*;
     use gripsight_identification::PerAxle;
+    use gripsight_vehicle::OwnTires;
 
     fn key() -> RunKey {
         RunKey {
@@ -361,7 +362,7 @@ mod tests {
 
     #[test]
     fn the_car_s_own_tires_survive_their_message_and_half_of_them_are_refused() {
-        let parameters = PosteriorParameter::of_tires(&tires());
+        let parameters = PosteriorParameter::of_tires(&OwnTires::assumed(&tires()));
         let n = parameters.len();
         let row = |i: usize| (0..n).map(|j| 1.0 / (3.0 + i as f64 + 2.0 * j as f64)).collect();
         let sent = TirePosterior {

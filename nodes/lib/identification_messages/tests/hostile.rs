@@ -6,7 +6,7 @@ use gripsight_identification::{INPUTS, OUTPUTS, PerAxle, Range, ResidualKind, Re
 use gripsight_identification_messages::{learned_model, own_tires, residual_model, tire_posterior};
 use gripsight_msgs as msg;
 use gripsight_mutants::{Mutants, bombs, peak_memory_mb};
-use gripsight_vehicle::{PacejkaParameters, PosteriorParameter, TirePosterior};
+use gripsight_vehicle::{OwnTires, PacejkaParameters, PosteriorParameter, TirePosterior};
 use serde::de::DeserializeOwned;
 
 const COUNT: usize = 3000;
@@ -98,7 +98,7 @@ fn a_model_that_asks_for_much_is_refused() {
 
 #[test]
 fn mutated_tires_are_refused_or_whole() {
-    let parameters = PosteriorParameter::of_tires(&tires());
+    let parameters = PosteriorParameter::of_tires(&OwnTires::assumed(&tires()));
     let n = parameters.len();
     let posterior = TirePosterior {
         status: "accepted".into(),

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
+use gripsight_vehicle::{OwnTires, VehicleParameters};
 use serde::{Deserialize, Serialize};
 
 use crate::effects::EffectId;
@@ -18,8 +18,8 @@ const SUBSTEP_S: f64 = 0.001;
 pub struct CarFile {
     /// The car as its file states it.
     pub vehicle: VehicleParameters,
-    /// The car's tires in a model with these effects.
-    pub tires: PacejkaParameters,
+    /// The car's own tires.
+    pub tires: OwnTires,
     /// Parameters of every effect by name.
     pub effects: BTreeMap<String, BTreeMap<String, f64>>,
 }

@@ -3,10 +3,10 @@
 //! The equations, and the code, are those of [`ExtendedModel::predict`](crate::ExtendedModel::predict): over the same inputs both give the same
 //! motion. What a step adds is a past of its own (wheels behind their command, slip behind its angle, sensors behind the car).
 
-use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
+use gripsight_vehicle::{OwnTires, VehicleParameters};
 
 use crate::effects::{EffectId, Wheels};
-use crate::model::{BASE, ExtendedModel, TIRES, tires_from_parameters, tires_to_parameters};
+use crate::model::{BASE, ExtendedModel, TIRES};
 use crate::motion::{Mover, Moving};
 use crate::recording::{Recording, Run};
 use crate::rollout::Window;
@@ -89,7 +89,7 @@ pub struct DrivenCar {
     /// The car as the file states it.
     pub vehicle: VehicleParameters,
     /// Its own tires.
-    pub tires: PacejkaParameters,
+    pub tires: OwnTires,
     /// Its effects with their parameters.
     pub effects: Vec<(EffectId, Vec<f64>)>,
     /// Longest step of the integration.
@@ -152,7 +152,7 @@ impl Drive {
         [v_x_mps, v_y_mps, yaw_rate_radps]: [f64; 3],
         controls: &Controls,
     ) -> Self {
-        let mut parameters = tires_to_parameters(&driven.tires).to_vec();
+        let mut parameters = driven.tires.to_parameters().to_vec();
         parameters.resize(BASE, 0.0);
         parameters.extend(driven.effects.iter().flat_map(|(_, own)| own));
         let mut car = Car::nominal(&driven.vehicle, [driven.tires.front.d, driven.tires.rear.d]);
@@ -280,7 +280,7 @@ impl Drive {
     }
 
     fn with_mover<R>(&self, steering_rad: &[f64; 2], then: impl FnOnce(&Mover<'_, '_, f64>) -> R) -> R {
-        let tires = tires_from_parameters(&self.parameters[..TIRES]);
+        let tires = OwnTires::from_parameters(&self.parameters[..TIRES]);
         let model = self.model();
         then(&Mover::new(&model, &self.parameters, &self.car, tires, steering_rad, 0, &STEP))
     }
@@ -386,7 +386,7 @@ mod tests {
             on_course: false,
         };
         let ids: Vec<EffectId> = effects.iter().map(|e| e.0).collect();
-        let mut p = tires_to_parameters(&tires()).to_vec();
+        let mut p = tires().to_parameters().to_vec();
         p.push(0.0);
         p.extend(effects.iter().flat_map(|e| e.1));
         let window = Window { segment: 0, from: 0, len: LEN };

@@ -40,6 +40,7 @@
 mod car_file;
 mod correction;
 mod drive;
+mod effective;
 mod effects;
 mod error;
 mod flexible;
@@ -57,6 +58,7 @@ mod terms;
 pub use car_file::CarFile;
 pub use correction::{Correction, CorrectionStream};
 pub use drive::{Along, Controls, Drive, Driven, DrivenCar};
+pub use effective::effective_tires;
 pub use effects::{
     Effect, EffectId, EffectSpec, Figure, Lagging, Need, OutsideTerm, ParameterSpec, Reported, Unknown,
     Usual, Wheels,
@@ -64,7 +66,7 @@ pub use effects::{
 pub use error::ModelError;
 pub use flexible::{Flexible, Group};
 pub use identities::{HEADING, Identity, LATERAL};
-pub use model::{BASE, ExtendedModel, HOLD, TIRES, tires_from_parameters, tires_to_parameters};
+pub use model::{BASE, ExtendedModel, HOLD, TIRES};
 pub use recording::{Channel, NEEDED_S, Recording, Run, WINDOW_S};
 pub use rollout::{Rollout, Window, tile};
 pub use site::Site;

@@ -5,7 +5,7 @@
 //! flexible terms.
 
 use crate::rollout::{Rollout, Window};
-use gripsight_vehicle::{MagicFormula, PacejkaParameters, Real, VehicleParameters};
+use gripsight_vehicle::{OWN_TIRE_PARAMETERS, OwnTires, Real, VehicleParameters};
 
 use crate::correction::Correction;
 use crate::effects::EffectId;
@@ -15,7 +15,7 @@ use crate::recording::{Channel, Recording};
 use crate::terms::{Car, Outputs, delayed};
 
 /// Parameters of the tires.
-pub const TIRES: usize = 8;
+pub const TIRES: usize = OWN_TIRE_PARAMETERS;
 /// Place of the hold of the command: how long after its stamp a recorded steering angle acts, within one sample.
 pub const HOLD: usize = TIRES;
 /// Parameters before those of the effects.
@@ -39,19 +39,6 @@ pub struct ExtendedModel<'a> {
     pub residual: Option<&'a dyn Correction>,
     /// Longest step of the integration.
     pub substep_s: f64,
-}
-
-/// Tires as the fit sees them: B C D, C, D, E of front and rear.
-pub fn tires_to_parameters(tires: &PacejkaParameters) -> [f64; TIRES] {
-    let axle = |t: &MagicFormula| [t.normalized_stiffness(), t.c, t.d, t.e];
-    let (f, r) = (axle(&tires.front), axle(&tires.rear));
-    [f[0], f[1], f[2], f[3], r[0], r[1], r[2], r[3]]
-}
-
-/// The inverse of [`tires_to_parameters`].
-pub fn tires_from_parameters<T: Real>(p: &[T]) -> PacejkaParameters<T> {
-    let axle = |p: &[T]| MagicFormula { b: p[0] / (p[1] * p[2]), c: p[1], d: p[2], e: p[3] };
-    PacejkaParameters { front: axle(&p[..4]), rear: axle(&p[4..]) }
 }
 
 impl<'a> ExtendedModel<'a> {
@@ -176,7 +163,7 @@ impl<'a> ExtendedModel<'a> {
         push: [T; 2],
         window: &Window,
     ) -> Outputs<T> {
-        let tires = tires_from_parameters(&p[..TIRES]);
+        let tires = OwnTires::from_parameters(&p[..TIRES]);
         let mut car = Car::nominal(self.vehicle, [tires.front.d, tires.rear.d]);
         for (effect, values) in self.with_parameters(p) {
             effect.car(values, &mut car);
@@ -272,8 +259,8 @@ pub(crate) mod tests {
         Recording::new(&sequence).unwrap()
     }
 
-    pub(crate) fn tires() -> PacejkaParameters {
-        PacejkaParameters::from_array([7.0, 1.5, 1.0, 0.1, 8.0, 1.4, 0.95, -0.2])
+    pub(crate) fn tires() -> OwnTires {
+        OwnTires::from_parameters(&[10.5, 1.5, 1.0, 0.1, 10.64, 1.4, 0.95, -0.2])
     }
 
     #[test]
@@ -282,10 +269,10 @@ pub(crate) mod tests {
         let vehicle = VehicleParameters::f1tenth();
         let window = Window { segment: 0, from: 120, len: 60 };
         let run = &recording.runs[0];
-        let mut base = tires_to_parameters(&tires()).to_vec();
+        let mut base = tires().to_parameters().to_vec();
         base.push(0.0);
         // The nominal model, stepped by its own crate, on the same tires as the fit sees them.
-        let car = SingleTrack::new(&vehicle, &tires_from_parameters(&base));
+        let car = SingleTrack::new(&vehicle, &OwnTires::from_parameters(&base).assumed_effective());
         let input = |k: usize| Input { v_x_mps: run.v_x_mps[k], steering_rad: run.steering_rad[k] };
         let mut x = State { v_y_mps: 0.05, yaw_rate_radps: 0.4 };
         let mut expected = vec![[x.v_y_mps, x.yaw_rate_radps]];
@@ -323,7 +310,7 @@ pub(crate) mod tests {
         let recording = Recording { has_command: true, ..recording(4) };
         let vehicle = VehicleParameters::f1tenth();
         let window = Window { segment: 0, from: 120, len: 60 };
-        let mut base = tires_to_parameters(&tires()).to_vec();
+        let mut base = tires().to_parameters().to_vec();
         base.push(0.0);
         let run = |effects: &[EffectId], size: f64| {
             let model = ExtendedModel::new(&recording, &vehicle, effects, 0.0025);
@@ -350,7 +337,7 @@ pub(crate) mod tests {
             let mut recording = Recording { has_command: true, ..recording(4) };
             recording.runs[0].force_x_mps2.iter_mut().for_each(|force| *force += more_mps2);
             let model = ExtendedModel::new(&recording, &vehicle, effects, 0.0025);
-            let mut p = tires_to_parameters(&tires()).to_vec();
+            let mut p = tires().to_parameters().to_vec();
             p.push(0.0);
             p.extend(own);
             model.predict(&p, [0.05, 0.4], &window).a_x_mps2[0]

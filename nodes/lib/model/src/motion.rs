@@ -4,7 +4,7 @@
 //! over the step, so that a lag of zero is no lag at all and its derivative there is right.
 
 use crate::rollout::Window;
-use gripsight_vehicle::{PacejkaParameters, Real};
+use gripsight_vehicle::{OwnTires, Real};
 
 use crate::effects::Lagging;
 use crate::flexible::Push;
@@ -23,7 +23,7 @@ pub(crate) struct Mover<'m, 'a, T> {
     p: &'m [T],
     car: &'m Car<T>,
     axles_at_rest: Axles<T>,
-    tires: PacejkaParameters<T>,
+    tires: OwnTires<T>,
     /// Road-wheel angles before the window, up to its start.
     before: &'m [T],
     /// Road-wheel angles in the window.
@@ -115,7 +115,7 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         model: &'m ExtendedModel<'a>,
         p: &'m [T],
         car: &'m Car<T>,
-        tires: PacejkaParameters<T>,
+        tires: OwnTires<T>,
         steering: &'m [T],
         run_in: usize,
         window: &'m Window,

@@ -13,7 +13,7 @@ use gripsight_estimation::Estimate;
 use gripsight_model::{Identity, Need};
 use gripsight_report::{Before, GapInput, Header, gap_page, gap_text, topic_notes};
 use gripsight_signals::{DataHealth, Pace, Spikes, TopicHealth};
-use gripsight_vehicle::PacejkaParameters;
+use gripsight_vehicle::{OwnTires, PacejkaParameters};
 
 fn estimate(value: f64, half: f64) -> Estimate {
     Estimate { value, low: value - half, high: value + half }
@@ -122,7 +122,7 @@ fn diagnosis() -> Diagnosis {
             scored_on: "held-out blocks",
         },
         gap_closed_fraction: estimate(0.7, 0.1),
-        extended_model: ExtendedModelFile::of_tires(tires),
+        extended_model: ExtendedModelFile::of_tires(OwnTires::assumed(&tires)),
         tires: TirePair { without_effect: tires, with_effect: tires },
         data_health: DataHealth {
             samples: 6000,

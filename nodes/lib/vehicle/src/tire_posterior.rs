@@ -2,18 +2,19 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{PacejkaParameters, VehicleError};
+use crate::{OWN_TIRE_PARAMETERS, OwnTires, VehicleError};
 
-/// Parameters of the Magic Formula of both axles, in the order of [`PacejkaParameters::from_array`].
-const TIRES: [&str; 8] = ["front.b", "front.c", "front.d", "front.e", "rear.b", "rear.c", "rear.d", "rear.e"];
+/// Parameters of the tires, in the order of [`OwnTires::to_parameters`].
+const TIRES: [&str; OWN_TIRE_PARAMETERS] =
+    ["front.stiffness", "front.c", "front.d", "front.e", "rear.stiffness", "rear.c", "rear.d", "rear.e"];
 
 /// A parameter of a [`TirePosterior`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PosteriorParameter {
-    /// `front.b` … `rear.e` of the Magic Formula; `effect.parameter` of what every car has a little of.
+    /// `front.stiffness` (B C D: cornering stiffness over load), `front.c`, `.d`, `.e` of the Magic Formula, the same of `rear`; `effect.parameter` of what every car has a little of.
     pub name: String,
-    /// Unit; `1` for none, `1/rad` of B.
+    /// Unit; `1` for none, `1/rad` of the stiffness.
     pub unit: String,
     /// Mean.
     pub mean: f64,
@@ -22,9 +23,9 @@ pub struct PosteriorParameter {
 impl PosteriorParameter {
     /// The parameters of both axles' tires, front first.
     #[must_use]
-    pub fn of_tires(tires: &PacejkaParameters) -> Vec<Self> {
+    pub fn of_tires(tires: &OwnTires) -> Vec<Self> {
         let unit = |i: usize| if i.is_multiple_of(4) { "1/rad" } else { "1" }.to_owned();
-        let values = tires.to_array();
+        let values = tires.to_parameters();
         TIRES
             .iter()
             .enumerate()
@@ -91,12 +92,12 @@ impl TirePosterior {
     ///
     /// # Errors
     /// [`VehicleError::Posterior`] where a parameter is missing.
-    pub fn tires(&self) -> Result<PacejkaParameters, VehicleError> {
-        let mut own = [0.0; TIRES.len()];
+    pub fn tires(&self) -> Result<OwnTires, VehicleError> {
+        let mut own = [0.0; OWN_TIRE_PARAMETERS];
         for (value, name) in own.iter_mut().zip(TIRES) {
             *value = self.mean(name)?;
         }
-        Ok(PacejkaParameters::from_array(own))
+        Ok(OwnTires::from_parameters(&own))
     }
 }
 
@@ -106,9 +107,9 @@ mod tests {
 
     #[test]
     fn what_is_wrong_with_it_is_named() {
-        let tires = PacejkaParameters::from_array([8.0, 1.4, 0.9, -0.5, 9.0, 1.5, 1.0, 0.2]);
+        let tires = OwnTires::from_parameters(&[8.0, 1.4, 0.9, -0.5, 9.0, 1.5, 1.0, 0.2]);
         let parameters = PosteriorParameter::of_tires(&tires);
-        assert_eq!((parameters[4].name.as_str(), parameters[4].unit.as_str()), ("rear.b", "1/rad"));
+        assert_eq!((parameters[4].name.as_str(), parameters[4].unit.as_str()), ("rear.stiffness", "1/rad"));
         let good = TirePosterior {
             status: "accepted".to_owned(),
             vehicle_hash: "0".to_owned(),

@@ -10,11 +10,9 @@ use std::process::Command;
 
 use gripsight_bag::{TopicMap, read_sequences};
 use gripsight_fmu::{LIBRARY, Version, write};
-use gripsight_model::{
-    BASE, CarFile, EffectId, ExtendedModel, Recording, TIRES, Window, tires_to_parameters,
-};
+use gripsight_model::{BASE, CarFile, EffectId, ExtendedModel, Recording, TIRES, Window};
 use gripsight_signals::WindowConfig;
-use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
+use gripsight_vehicle::{OwnTires, PacejkaParameters, VehicleParameters};
 use serde::Deserialize;
 
 /// What `simulate.py` says.
@@ -57,7 +55,7 @@ fn car() -> CarFile {
     ];
     CarFile {
         vehicle: VehicleParameters::from_ros_yaml(&text).unwrap(),
-        tires: PacejkaParameters::from_array([9.0, 1.5, 0.95, 0.1, 10.0, 1.4, 1.0, -0.2]),
+        tires: OwnTires::assumed(&PacejkaParameters::from_array([9.0, 1.5, 0.95, 0.1, 10.0, 1.4, 1.0, -0.2])),
         effects: effects.into_iter().map(|(name, own)| (name.to_owned(), own)).collect(),
     }
 }
@@ -88,7 +86,7 @@ fn fmpy_validates_the_unit_and_drives_it_like_the_model() {
     let car = car();
     let driven = car.driven().unwrap();
     let effects: Vec<EffectId> = driven.effects.iter().map(|e| e.0).collect();
-    let mut parameters = tires_to_parameters(&car.tires).to_vec();
+    let mut parameters = car.tires.to_parameters().to_vec();
     assert_eq!((parameters.len(), BASE), (TIRES, TIRES + 1));
     parameters.push(0.0);
     parameters.extend(driven.effects.iter().flat_map(|e| e.1.clone()));

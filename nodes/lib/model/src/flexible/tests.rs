@@ -1,6 +1,6 @@
 use super::*;
+use crate::model::ExtendedModel;
 use crate::model::tests::{recording, tires};
-use crate::model::{ExtendedModel, tires_to_parameters};
 use crate::rollout::Window;
 use gripsight_vehicle::VehicleParameters;
 
@@ -10,7 +10,7 @@ fn predicted(flexible: Option<Flexible>, own: &[f64]) -> Vec<Vec<f64>> {
     let vehicle = VehicleParameters::f1tenth();
     let mut model = ExtendedModel::new(&recording, &vehicle, &[], 0.0025);
     model.flexible = flexible;
-    let mut p = tires_to_parameters(&tires()).to_vec();
+    let mut p = tires().to_parameters().to_vec();
     p.push(0.0);
     p.extend(own);
     let out = model.predict(&p, [0.05, 0.4], &Window { segment: 0, from: 120, len: 50 });

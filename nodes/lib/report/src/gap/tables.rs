@@ -72,7 +72,7 @@ pub(super) fn tires(d: &Diagnosis) -> Markup {
             }
         }
         p {
-            "Read the stiffness, and the peak where slip was driven up to it. B, C and E alone say little: they make up for each other, and for a "
+            "Effective tires of a bare single-track model (Phi_p) over the slips driven. Read the stiffness, and the peak where slip was driven up to it. B, C and E alone say little: they make up for each other, and for a "
             "peak that was not reached."
         }
     }

@@ -8,7 +8,7 @@ mod open_car_dynamics;
 mod slipx;
 
 use gripsight_model::{Car, CarFile, EffectId, ModelError, OutsideTerm};
-use gripsight_vehicle::PacejkaParameters;
+use gripsight_vehicle::OwnTires;
 
 /// Whose files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,7 +66,7 @@ struct Figures {
     /// Time constant and shape of the servo.
     lag: Option<[f64; 2]>,
     rate_radps: Option<f64>,
-    tires: PacejkaParameters,
+    tires: OwnTires,
 }
 
 /// Wheel radius over wheelbase of a car whose own is not known.

@@ -6,7 +6,7 @@ use std::process::Command;
 
 use gripsight_model::{CarFile, EffectId};
 use gripsight_simulator::{Target, export};
-use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
+use gripsight_vehicle::{OwnTires, PacejkaParameters, VehicleParameters};
 
 use crate::support::python;
 
@@ -15,7 +15,7 @@ fn car() -> CarFile {
     let lag = BTreeMap::from([("tau_s".to_owned(), 0.05), ("q".to_owned(), 0.25)]);
     CarFile {
         vehicle: VehicleParameters { name: Some("blue car".to_owned()), ..VehicleParameters::f1tenth() },
-        tires: PacejkaParameters::from_array([9.0, 1.5, 0.95, 0.1, 10.0, 1.4, 1.0, -0.2]),
+        tires: OwnTires::assumed(&PacejkaParameters::from_array([9.0, 1.5, 0.95, 0.1, 10.0, 1.4, 1.0, -0.2])),
         effects: BTreeMap::from([
             ("tire_relaxation".to_owned(), own("sigma_m", 0.07)),
             ("mass_error".to_owned(), own("ratio", 1.1)),
