@@ -18,10 +18,9 @@ import numpy as np
 
 TABLE = Path(__file__).with_name("development_effects.csv")
 HEAD = ["batch", "case", "kind", "effect", "cause", "needed_fraction", "size_over_half_width", "over_unexplained"]
-# Shares and widths at which a sign counts nothing.
-UNITS = [0.025, 2.5]
-# What is less is as good as nothing.
-LEAST = [1e-3, 0.1]
+# Size over half width at which it counts nothing, and what is as good as nothing.
+UNIT = 2.5
+LEAST = 0.1
 RIDGE = 0.1
 # Chance from which the verdict names an effect.
 NAMED = 0.6
@@ -45,8 +44,8 @@ def collected(batches):
 
 
 def signs(rows):
-    values = np.array([[float(v) for v in row[5:7]] for row in rows])
-    return np.column_stack([np.ones(len(rows)), np.log(np.maximum(values, LEAST) / UNITS)])
+    size = np.array([float(row[6]) for row in rows])
+    return np.column_stack([np.ones(len(rows)), np.log(np.maximum(size, LEAST) / UNIT)])
 
 
 def fitted(x, cause):

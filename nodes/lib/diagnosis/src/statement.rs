@@ -23,12 +23,9 @@ pub(crate) struct Statement {
 impl Statement {
     /// Chance that the effect, or what does nearly the same, is a cause.
     pub(crate) fn chance_of_alike(&self) -> f64 {
-        let signs = [self.closes, self.size_over_half_width];
-        let sign = |i: usize| {
-            let [unit, least] = [decisions::CHANCE_UNITS[i], decisions::CHANCE_LEAST[i]];
-            decisions::CHANCE[i + 1] * (signs[i].max(least) / unit).ln()
-        };
-        let log_odds = decisions::CHANCE[0] + (0..signs.len()).map(sign).sum::<f64>();
+        let [constant, by_size] = decisions::CHANCE;
+        let size = self.size_over_half_width.max(decisions::CHANCE_LEAST);
+        let log_odds = constant + by_size * (size / decisions::CHANCE_UNIT).ln();
         1.0 / (1.0 + (-log_odds).exp())
     }
 
@@ -97,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn each_sign_raises_the_chance() {
+    fn a_size_far_from_nothing_raises_the_chance_and_what_is_not_tried_lowers_it() {
         let weak = Statement {
             term: 0,
             untried: 0,
@@ -117,7 +114,6 @@ mod tests {
         assert!(strong.chance() > 0.8, "{}", strong.chance());
         for less in [
             Statement { size_over_half_width: 1.0, ..strong.clone() },
-            Statement { closes: 0.001, ..strong.clone() },
             Statement { untried: 1, ..strong.clone() },
         ] {
             assert!(less.chance() < strong.chance());
