@@ -3,7 +3,7 @@
 use gripsight_estimation::{Windows, split};
 use gripsight_model::{EffectId, Flexible, HOLD, Need, Recording, Site};
 use gripsight_signals::{DataHealth, StateSequence};
-use gripsight_vehicle::{OwnTires, PacejkaParameters, TirePosterior, VehicleParameters};
+use gripsight_vehicle::{OWN_TIRE_PARAMETERS, OwnTires, PacejkaParameters, TirePosterior, VehicleParameters};
 
 use crate::budget::{Budget, CANDIDATES, Models, Scorer, large_slip_rad};
 use crate::engine::Engine;
@@ -73,11 +73,12 @@ impl<'a> Request<'a> {
     }
 }
 
-/// Where fits without any knowledge of the tires start: (B, C, D, E) front and rear.
-const GENERIC: [[f64; 8]; 3] = [
-    [6.5, 1.5, 1.0, 0.0, 6.5, 1.5, 1.0, 0.0],
-    [12.0, 1.5, 1.2, 0.0, 13.0, 1.5, 1.2, 0.0],
-    [14.0, 1.5, 1.7, 0.0, 18.0, 1.5, 1.7, 0.0],
+/// Where fits without any knowledge of the tires start, from soft to stiff: cornering stiffness over load (B C D, 1/rad), C, D, E of front and rear, as
+/// [`OwnTires::from_parameters`] takes them. B is 6.5 to 18.
+const GENERIC: [[f64; OWN_TIRE_PARAMETERS]; 3] = [
+    [9.75, 1.5, 1.0, 0.0, 9.75, 1.5, 1.0, 0.0],
+    [21.6, 1.5, 1.2, 0.0, 23.4, 1.5, 1.2, 0.0],
+    [35.7, 1.5, 1.7, 0.0, 45.9, 1.5, 1.7, 0.0],
 ];
 /// Windows that the inference works on, at most.
 pub(crate) const SEARCH_WINDOWS: usize = 70;
@@ -308,4 +309,22 @@ pub(crate) fn library(
         }
     }
     Ok((library, invisible))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fits_start_from_soft_and_stiff_tires() {
+        let b = GENERIC.map(|start| {
+            let tires = OwnTires::from_parameters(&start);
+            [tires.front.b, tires.rear.b]
+        });
+        for (found, expected) in b.iter().zip([[6.5, 6.5], [12.0, 13.0], [14.0, 18.0]]) {
+            for (found, expected) in found.iter().zip(expected) {
+                approx::assert_relative_eq!(*found, expected, max_relative = 1e-12);
+            }
+        }
+    }
 }

@@ -38,7 +38,6 @@ fn axles_of_the_plant(car: &CarParameters, vehicle: &VehicleParameters, mu: f64)
 /// The car as the library writes it: tires of the single wheels' formula, and what it has of its own.
 fn written(car: &CarParameters, vehicle: &VehicleParameters, mu: f64) -> DrivenCar {
     let axle = |stiffness: f64, grip: f64| {
-        // A curve that falls to the sliding share far beyond its peak.
         let tire = MagicFormula::from_stiffness(stiffness, 1.4, grip * mu, 0.0);
         [tire.normalized_stiffness(), tire.c, tire.d, tire.e]
     };
