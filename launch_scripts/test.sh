@@ -26,8 +26,8 @@ else
 fi
 cargo test --workspace --locked --doc --quiet
 
-step "Python: road renderer, warm start"
-.venv/bin/python -m pytest -q -p no:cacheprovider nodes/camera_prior/training/test_render.py tests/results/camera_prior
+step "Python: road renderer, warm start, subscribers"
+.venv/bin/python -m pytest -q -p no:cacheprovider nodes/camera_prior/training/test_render.py tests/results/camera_prior nodes/identifier/examples
 
 step "documentation"
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked --quiet

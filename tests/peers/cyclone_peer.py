@@ -4,6 +4,7 @@
     cyclone_peer.py publish TOPIC TYPE [--qos ...]      messages as JSON lines on standard input; --times N sends each N times,
                                                         --stamp with the time of sending in its header
     cyclone_peer.py call SERVICE TYPE REQUEST           a service of a node under rmw_cyclonedds_cpp; REQUEST is JSON
+    cyclone_peer.py serve SERVICE TYPE REPLY            the same service offered: prints each request and answers REPLY, until --count came
     cyclone_peer.py types TOPIC TYPE [--count N]        the types that endpoints of a topic are announced with, once N endpoints stand and
                                                         none has come for two seconds; exit code 1: others than TYPE
 
@@ -174,19 +175,47 @@ def types(participant, args):
     return is_settled and names == [args.type]
 
 
-def call(participant, args):
+def service(participant, args):
+    """The topics of requests and replies."""
     package, name = args.type.split("/srv/")
     request_text, reply_text = SERVICES[name]
     head = "uint64 guid\nint64 seq\n"  # rmw_cyclonedds_cpp puts these in front of every request and reply
     request_type = struct(package, f"{name}_Request", "srv", head + request_text)
     reply_type = struct(package, f"{name}_Response", "srv", head + reply_text)
-    writer = DataWriter(participant, Topic(participant, f"rq{args.topic}Request", request_type), qos("reliable"))
+    requests = Topic(participant, f"rq{args.topic}Request", request_type)
+    return requests, Topic(participant, f"rr{args.topic}Reply", reply_type), request_type, reply_type
+
+
+def serve(participant, args):
+    requests, replies, _, reply_type = service(participant, args)
+    reader = DataReader(participant, requests, qos("reliable"))
+    writer = DataWriter(participant, replies, qos("reliable"))
+    print("ready", flush=True)
+    answered = 0
+
+    def answer():
+        nonlocal answered
+        for request in reader.take(N=10):
+            if request.sample_info.valid_data:
+                show(request)
+                writer.write(build(reply_type, {"guid": request.guid, "seq": request.seq, **json.loads(args.request)}))
+                answered += 1
+        return answered >= args.count
+
+    came = wait_until(answer, args.timeout)
+    time.sleep(0.5)  # The last reply is still under way.
+    return came
+
+
+def call(participant, args):
+    requests, replies_topic, request_type, reply_type = service(participant, args)
+    writer = DataWriter(participant, requests, qos("reliable"))
     if not wait_until(writer.get_matched_subscriptions, args.timeout):
         return False
     # The worst order that discovery allows: the server has the request before it knows of the reader of its reply.
     writer.write(build(request_type, {"guid": 4711, "seq": 1, **json.loads(args.request)}))
     time.sleep(0.2)
-    reader = DataReader(participant, Topic(participant, f"rr{args.topic}Reply", reply_type), qos("reliable"))
+    reader = DataReader(participant, replies_topic, qos("reliable"))
     replies = []
 
     def take():
@@ -201,7 +230,7 @@ def call(participant, args):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("command", choices=["subscribe", "publish", "call", "types"])
+    parser.add_argument("command", choices=["subscribe", "publish", "call", "serve", "types"])
     parser.add_argument("topic")
     parser.add_argument("type")
     parser.add_argument("request", nargs="?")
@@ -212,7 +241,7 @@ def main():
     parser.add_argument("--stamp", action="store_true")
     parser.add_argument("--timeout", type=float, default=20.0)
     args = parser.parse_args()
-    work = {"subscribe": subscribe, "publish": publish, "call": call, "types": types}[args.command]
+    work = {"subscribe": subscribe, "publish": publish, "call": call, "serve": serve, "types": types}[args.command]
     sys.exit(0 if work(DomainParticipant(int(os.environ.get("ROS_DOMAIN_ID", 0))), args) else 1)
 
 

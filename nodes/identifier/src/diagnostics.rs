@@ -1,6 +1,6 @@
 //! The node's state in words.
 
-use gripsight_runtime::{Level, Status};
+use gripsight_runtime::{Level, SetError, Status};
 
 /// How the last run ended.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,6 +66,15 @@ pub(crate) fn status(facts: &Facts) -> Status {
         .value("sequence of the set in force", facts.in_force.map_or("none".to_owned(), |id| id.to_string()))
 }
 
+/// How a controller that takes parameters is: whether it has the set in force, and the share of its grip that is left.
+pub(crate) fn controller_status(told: &Result<(), SetError>, sequence_id: u64, left: f64) -> Status {
+    let status = match told {
+        Ok(()) => Status::new(Level::Ok, "the controller has the set in force"),
+        Err(error) => Status::new(Level::Warn, format!("the controller has not taken the set: {error}")),
+    };
+    status.value("sequence of the set", sequence_id).value("share of the promised grip", format!("{left:.2}"))
+}
+
 #[cfg(test)]
 mod tests {
     use gripsight_runtime::manual_covers;
@@ -98,6 +107,10 @@ mod tests {
             LastRun::Rejected { reason: reason() },
             LastRun::Failed { reason: reason() },
         ];
-        assert_eq!(manual_covers(include_str!("../README.md"), &states.map(of)), Ok(()));
+        let absent = Err(SetError::Absent { service: "/mpc/set_parameters".to_owned() });
+        let controller = [controller_status(&Ok(()), 7, 1.0), controller_status(&absent, 7, 0.6)];
+        assert_eq!(controller.each_ref().map(|s| s.level), [Level::Ok, Level::Warn]);
+        let said: Vec<Status> = states.map(of).into_iter().chain(controller).collect();
+        assert_eq!(manual_covers(include_str!("../README.md"), &said), Ok(()));
     }
 }

@@ -1,5 +1,6 @@
 //! Node: residual models and a friction prior to Pacejka parameters. See the README beside this folder.
 
+mod controller;
 mod diagnostics;
 mod memory;
 mod node;

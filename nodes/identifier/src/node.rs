@@ -58,6 +58,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
             () = collect_sequences(sequences, newest) => {}
             () = collect_friction(frictions, prior, &facts) => {}
             () = report(&diagnostics, &facts) => {}
+            () = outputs.keep_controller(&diagnostics) => {}
             () = follow_grip(odometry, drive, &vehicle, &in_force, &outputs) => {}
             () = publish_each(runs, &vehicle, &outputs) => {}
             () = identify_each(sequence, prior_in_force, models, ended, &outputs, &vehicle, &settings, &in_force, &facts) => {}

@@ -10,10 +10,11 @@ use gripsight_msgs::standard::std_msgs::Header;
 use gripsight_msgs::{
     Grip, IdentificationProgress as Progress, PacejkaParams, TirePosterior as PosteriorMessage,
 };
-use gripsight_runtime::{Node, Parameter, Publisher, Qos};
+use gripsight_runtime::{Diagnostics, Node, Parameter, Publisher, Qos};
 use gripsight_signals::StateSequence;
 use gripsight_vehicle::{TirePosterior, VehicleParameters};
 
+use crate::controller::Controller;
 use crate::memory;
 
 /// Where results go.
@@ -23,18 +24,21 @@ pub(crate) struct Outputs {
     posterior: Publisher<PosteriorMessage>,
     grip: Publisher<Grip>,
     progress: Publisher<Progress>,
+    /// A controller that takes parameters in place of messages.
+    controller: Option<Controller>,
     /// Where the set that the MPC was told last is kept; empty: nowhere.
     folder: Parameter<String>,
 }
 
 impl Outputs {
-    pub(crate) fn new(node: &mut Node, folder: Parameter<String>) -> Result<Self, gripsight_runtime::Error> {
+    pub(crate) fn new(node: &mut Node, folder: Parameter<String>) -> anyhow::Result<Self> {
         Ok(Self {
             candidate: node.publisher("~/candidate", Qos::latched())?,
             pacejka: node.publisher("~/pacejka", Qos::latched())?,
             posterior: node.publisher("~/posterior", Qos::latched())?,
             grip: node.publisher("~/grip", Qos::latched())?,
             progress: node.publisher("~/progress", Qos::latched())?,
+            controller: Controller::declare(node)?,
             folder,
         })
     }
@@ -59,12 +63,27 @@ impl Outputs {
 
     /// Publishes a set on the MPC's topic, and keeps it for the next start.
     pub(crate) async fn publish(&self, message: &PacejkaParams) {
-        self.pacejka.publish(message).await;
+        self.hand_on(message).await;
         let folder = self.folder.get();
         if !folder.is_empty()
             && let Err(error) = memory::keep(Path::new(&folder), message, SystemTime::now())
         {
             tracing::error!("the set is not kept for the next start: {error}");
+        }
+    }
+
+    async fn hand_on(&self, message: &PacejkaParams) {
+        self.pacejka.publish(message).await;
+        if let Some(controller) = &self.controller {
+            controller.take(message);
+        }
+    }
+
+    /// Keeps a controller that takes parameters in step, where there is one.
+    pub(crate) async fn keep_controller(&self, diagnostics: &Diagnostics) {
+        match &self.controller {
+            Some(controller) => controller.hand_on(diagnostics).await,
+            None => std::future::pending().await,
         }
     }
 
@@ -85,7 +104,7 @@ impl Outputs {
                 tracing::info!("{}", set.reason);
                 self.candidate.publish(&set).await;
                 if provisional {
-                    self.pacejka.publish(&set).await;
+                    self.hand_on(&set).await;
                 }
             }
             Ok(None) => {}
@@ -96,6 +115,9 @@ impl Outputs {
     /// Publishes how the set in force grips.
     pub(crate) async fn grip(&self, message: &Grip) {
         self.grip.publish(message).await;
+        if let Some(controller) = &self.controller {
+            controller.feel(message);
+        }
     }
 
     /// Says that there has been no sequence yet.

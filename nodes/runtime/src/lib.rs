@@ -28,7 +28,7 @@
 //! }
 //! ```
 //!
-//! Not implemented: lifecycle nodes, composition, actions, services of a node's own other than triggers, and type
+//! Not implemented: lifecycle nodes, composition, actions, services of a node's own other than triggers, clients other than of `set_parameters`, and type
 //! hashes in discovery: they travel as USER_DATA of an endpoint, which RustDDS 0.15.1 reads of others and cannot send (its QoS policies have
 //! none, and its announcements leave the parameter out); both RMWs of ROS 2 Jazzy accept that, rmw_cyclonedds with a warning.
 
@@ -44,6 +44,7 @@ mod logging;
 mod manual;
 mod names;
 mod node;
+mod parameter_client;
 mod parameter_file;
 mod parameter_services;
 mod parameters;
@@ -63,6 +64,7 @@ pub use error::Error;
 pub use inputs::Arrivals;
 pub use manual::manual_covers;
 pub use node::{Node, Trigger};
+pub use parameter_client::{ParameterClient, SetError};
 pub use parameters::{Descriptor, Parameter};
 pub use publisher::{Publisher, RawPublisher};
 pub use qos::Qos;

@@ -25,6 +25,7 @@ use crate::guard::Guard;
 use crate::inputs::{self, Arrivals};
 use crate::logging;
 use crate::names::Identity;
+use crate::parameter_client::ParameterClient;
 use crate::parameter_services::{ParameterServices, serve_trigger};
 use crate::parameters::{Descriptor, Parameter, ParameterStore};
 use crate::publisher::{PATIENCE, Publisher, REPLAY_PATIENCE, RawCdr, RawPublisher};
@@ -240,6 +241,16 @@ impl Node {
             self.spawn(serving);
         }
         Ok(Trigger { calls })
+    }
+
+    /// A client that sets the parameters of another node (relative or absolute name).
+    ///
+    /// # Errors
+    /// [`Error::Name`], or [`Error::Create`] when DDS refuses.
+    pub fn parameter_client(&mut self, node: &str) -> Result<ParameterClient, Error> {
+        let node = self.identity.resolve(node)?;
+        let mut ros = self.ros.lock().unwrap_or_else(PoisonError::into_inner);
+        ParameterClient::new(&mut ros, &node, self.context.domain_participant())
     }
 
     /// States that the node can do nothing without messages on one of these topics. Where none has come for five seconds a line in the

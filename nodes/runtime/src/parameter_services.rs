@@ -31,7 +31,7 @@ const CYCLONE_DDS: [u8; 2] = [0x01, 0x10];
 macro_rules! service_messages {
     ($($name:ident { $($field:ident: $type:ty),* })*) => {$(
         #[derive(Clone, Debug, Serialize, Deserialize)]
-        struct $name { $($field: $type),* }
+        pub(crate) struct $name { $(pub(crate) $field: $type),* }
         impl Message for $name {}
     )*};
 }
@@ -222,7 +222,12 @@ where
 
 /// Whether a client asks by this mapping; the other's server answers the others.
 fn asks_by(mapping: ServiceMapping, client: &RmwRequestId) -> bool {
-    (mapping == ServiceMapping::Cyclone) == client.writer_gid.as_bytes().starts_with(&CYCLONE_DDS)
+    mapping == mapping_of(client.writer_gid.as_bytes())
+}
+
+/// How the middleware of an endpoint with this GUID maps services to DDS.
+pub(crate) fn mapping_of(guid: &[u8]) -> ServiceMapping {
+    if guid.starts_with(&CYCLONE_DDS) { ServiceMapping::Cyclone } else { ServiceMapping::Enhanced }
 }
 
 /// The topic on which a service replies, by its DDS name.

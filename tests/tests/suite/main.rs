@@ -4,6 +4,7 @@
 
 mod bag_player;
 mod camera_prior;
+mod controller;
 mod driver;
 mod fault_injector;
 mod gap_diagnosis;

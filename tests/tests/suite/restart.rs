@@ -10,6 +10,7 @@ use gripsight_tests::peers::{PATIENCE, available, cyclone, parsed, start_cyclone
 use gripsight_tests::process::{Process, node};
 use gripsight_vehicle::VehicleParameters;
 
+use super::controller;
 use super::identification::{accepted, drive, identifier, listen, suite, tell_prior};
 
 const PACEJKA: &str = "/identifier/pacejka";
@@ -80,21 +81,26 @@ fn a_killed_identifier_comes_back_with_its_own_car_s_set_as_provisional_and_with
     let tires = listen(&domain, &python, PACEJKA, PacejkaParams::TYPE, "latched", "1");
     let [_telemetry, _residual, unkept] = suite(&domain, &vehicle, "30.0");
     drop(unkept);
-    let first = identifier(&domain, &vehicle, &keeps);
+    let mpc = controller::peer(&domain, &python);
+    let first = identifier(&domain, &vehicle, &[&keeps[..], &controller::OF_PEER].concat());
     tell_prior(&domain, &python);
     let path = format!("bag:={}", bag.display());
     let wait = "wait_for:=[/car_state/odom, /drive, /imu/data, /wheel_speeds]";
     let _player = node(&domain, "bag_player", &["-p", &path, "-p", "rate:=10.0", "-p", wait]);
     let before = accepted(&tires);
     let heard = Instant::now();
+    controller::assert_told(&mpc, &first, &before);
     // SIGKILL; the rest of the suite goes on.
     drop(first);
     std::thread::sleep(AWAY);
 
     // Where the MPC takes provisional sets it has one at once, and the run on the window that telemetry still has follows.
     let tires = listen(&domain, &python, PACEJKA, PacejkaParams::TYPE, "latched", "1");
-    let second = identifier(&domain, &vehicle, &keeps_and_tells);
+    let own = node(&domain, "stubborn_node", &[]);
+    let second = identifier(&domain, &vehicle, &[&keeps_and_tells[..], &controller::OF_OWN].concat());
     assert_recalled(&parsed(&tires.line(PATIENCE)), &before, heard);
+    controller::assert_set(&domain, &python, &second, &before);
+    drop(own);
     drop(second);
     drop((_telemetry, _residual));
 
