@@ -3,7 +3,7 @@
 use gripsight_signals::{Segment, StateSequence, segments};
 
 use crate::commands::Commands;
-use crate::{Channel, SimulatorError};
+use crate::{Channel, SimulatorError, speed};
 
 /// Length of the windows that are fitted and scored.
 pub const WINDOW_S: f64 = 0.5;
@@ -17,8 +17,6 @@ const WARM_UP_S: f64 = 0.5;
 const NEEDED_S: f64 = 8.0;
 /// Below this nothing about tires or steering shows.
 const LEAST_SPEED_MPS: f64 = 1.0;
-/// Half width of the triangle that a measured forward speed is smoothed by before it is imposed.
-const SMOOTHING_S: f64 = 0.03;
 
 /// A window of samples of one stretch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,7 +76,18 @@ impl Drive {
                 "the bag holds no drive commands: a simulator needs something to follow".to_owned(),
             ));
         }
-        let stretches: Vec<Stretch> = parts.into_iter().map(stretch).collect();
+        let speeds = {
+            let runs: Vec<(&[f64], f64)> = parts.iter().map(|s| (s.v_x_mps.as_slice(), s.dt_s)).collect();
+            speed::smooth(&runs)
+        };
+        let stretches: Vec<Stretch> = parts
+            .into_iter()
+            .zip(speeds)
+            .map(|(segment, speeds)| {
+                let (v_x_mps, a_x_mps2) = speeds.into_iter().map(|[v, a]| (v, a)).unzip();
+                Stretch { segment, v_x_mps, a_x_mps2 }
+            })
+            .collect();
         let dt_s = stretches.first().map_or(0.01, |s| s.segment.dt_s);
         let windows = windows(&stretches, dt_s);
         let usable_s = windows.iter().map(|w| w.len as f64 * dt_s).sum::<f64>();
@@ -119,32 +128,6 @@ impl Stretch {
     }
 }
 
-fn stretch(segment: Segment) -> Stretch {
-    let half = (SMOOTHING_S / segment.dt_s).round() as isize;
-    let v = &segment.v_x_mps;
-    let last = v.len() as isize - 1;
-    let smooth: Vec<f64> = (0..=last)
-        .map(|k| {
-            let (mut sum, mut weights) = (0.0, 0.0);
-            for d in -half..=half {
-                let weight = (half + 1 - d.abs()) as f64;
-                sum += weight * v[(k + d).clamp(0, last) as usize];
-                weights += weight;
-            }
-            sum / weights
-        })
-        .collect();
-    // Over a tenth of a second: the derivative of a noisy speed otherwise says more of the noise.
-    let reach = (0.05 / segment.dt_s).round().max(1.0) as isize;
-    let a_x_mps2 = (0..=last)
-        .map(|k| {
-            let (from, to) = ((k - reach).max(0), (k + reach).min(last));
-            (smooth[to as usize] - smooth[from as usize]) / ((to - from).max(1) as f64 * segment.dt_s)
-        })
-        .collect();
-    Stretch { v_x_mps: smooth, a_x_mps2, segment }
-}
-
 fn windows(stretches: &[Stretch], dt_s: f64) -> Vec<Window> {
     let samples = |t_s: f64| (t_s / dt_s).round().max(4.0) as usize;
     let (len, block_len) = (samples(WINDOW_S), samples(BLOCK_S));
@@ -167,10 +150,13 @@ fn windows(stretches: &[Stretch], dt_s: f64) -> Vec<Window> {
     out
 }
 
-/// Standard deviation of a channel's noise: of differences of the order that leaves least of the motion, by the median, so that neither
-/// jumps nor fast turns count as noise.
+/// Standard deviation of a channel's noise: of differences of the order that leaves least of the motion, clipped at three of it by the
+/// median, so that neither jumps nor fast turns count as noise.
 fn noise(runs: &[&[f64]]) -> f64 {
     const CONSISTENT: f64 = 1.4826;
+    /// Beyond so many standard deviations it is not noise, and the share of its variance that lies within.
+    const CLIP: f64 = 3.0;
+    const WITHIN: f64 = 0.9733;
     let mut least = f64::INFINITY;
     let mut largest: f64 = 0.0;
     for order in 2..=6_usize {
@@ -195,7 +181,11 @@ fn noise(runs: &[&[f64]]) -> f64 {
         }
         let middle = all.len() / 2;
         let median = *all.select_nth_unstable_by(middle, f64::total_cmp).1;
-        least = least.min(CONSISTENT * median / growth.sqrt());
+        // The median alone knows the noise of 20 s to 3 %, and the least of several is low by as much.
+        let most = CLIP * CONSISTENT * median;
+        let (sum, count) =
+            all.iter().filter(|d| **d <= most).fold((0.0, 0.0), |(s, n): (f64, f64), d| (s + d * d, n + 1.0));
+        least = least.min((sum / count.max(1.0) / WITHIN / growth).sqrt());
     }
     // No finer than a ten-thousandth of the channel: a simulator without noise must not be asked for more.
     least.max(1e-4 * largest).max(1e-9)

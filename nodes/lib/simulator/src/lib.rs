@@ -25,6 +25,7 @@ mod plan;
 mod pool;
 mod search;
 mod server;
+mod speed;
 #[cfg(test)]
 mod test_car;
 pub mod wire;
