@@ -130,7 +130,7 @@ pub(crate) fn pair(simulator_file: &Path, bag: &Path, other: &Path) -> anyhow::R
     let result = diagnose(&simulator, &question, &mut |_| {})?;
     let (said, patched) = patched(&file, &simulator, &question, &result)?;
     let question = Question { sequence: &other, commands: Commands::of(&other), ..question };
-    let before = error_over(&simulator, &question, &[], Span::Whole)?;
+    let before = error_over(&simulator, &question, &[], Span::Whole, &[])?.over_noise;
     let named: Vec<(String, f64)> = result
         .fitted
         .iter()
@@ -139,8 +139,8 @@ pub(crate) fn pair(simulator_file: &Path, bag: &Path, other: &Path) -> anyhow::R
         .collect();
     let after = match patched {
         _ if named.is_empty() => before,
-        Some(patched) => error_over(&patched, &question, &named, Span::Whole)?,
-        None => error_over(&simulator, &question, &named, Span::Whole)?,
+        Some(patched) => error_over(&patched, &question, &named, Span::Whole, &[])?.over_noise,
+        None => error_over(&simulator, &question, &named, Span::Whole, &[])?.over_noise,
     };
     let file = PairFile {
         diagnosis: &result,
@@ -150,8 +150,8 @@ pub(crate) fn pair(simulator_file: &Path, bag: &Path, other: &Path) -> anyhow::R
     Ok(serde_json::to_string(&file)? + "\n")
 }
 
-/// The patch of the parameter file, what the simulator that reads it says of held-out data, and that simulator. One that makes these worse is
-/// not given.
+/// The patch of the parameter file, what the simulator that reads it says of held-out data, and that simulator. One that these are not
+/// clearly better with is not given.
 fn patched(
     file: &SimulatorFile,
     simulator: &Simulator,
@@ -172,10 +172,10 @@ fn patched(
     fs::write(copy.path().join(name), &found.text).context("cannot write the patched parameters")?;
     let patched = Simulator::start_with(file, Some(&copy.path().join(name)))
         .context("cannot start the simulator with the patched parameters")?;
-    let error = error_over(&patched, question, &result.fitted, Span::HeldOut)?;
-    said.verified = Some(error);
-    said.is_worse = error >= result.gap.nominal.value;
-    if said.is_worse {
+    let error = error_over(&patched, question, &result.fitted, Span::HeldOut, &result.residuals)?;
+    said.verified = Some(error.over_noise);
+    said.is_no_better = !error.is_clearly_less;
+    if said.is_no_better {
         return Ok((said, None));
     }
     said.diff = found.diff;

@@ -73,6 +73,29 @@ impl<'a> Scored<'a> {
         Estimate { value, low: at(0.05), high: at(0.95) }
     }
 
+    /// Every window, fitted or not: what nothing was fitted for.
+    pub(crate) fn everywhere(layout: &'a Layout, starts: usize) -> Self {
+        let blocks = (0..layout.windows.len()).map(|w| vec![w]).collect();
+        Self { layout, starts, blocks, on: "all of it" }
+    }
+
+    /// Whether one model beats another by more than noise gives at 5 %: where predictions are `d` apart, squares differ by noise of `2 |d|`.
+    pub(crate) fn is_clearly_better(&self, worse: &[f64], better: &[f64]) -> bool {
+        const Z: f64 = 1.645;
+        let (mut gained, mut apart, mut left, mut freedom) = (0.0, 0.0, 0.0, 0.0);
+        for &w in self.blocks.iter().flatten() {
+            let (from, len) = self.layout.windows[w];
+            for (a, b) in worse[from..from + len].iter().zip(&better[from..from + len]) {
+                gained += a * a - b * b;
+                apart += (a - b) * (a - b);
+                left += b * b;
+            }
+            freedom += self.freedom(w);
+        }
+        let noise = (left / f64::max(freedom, 1.0)).max(1.0).sqrt();
+        gained > 2.0 * Z * noise * apart.sqrt()
+    }
+
     /// How sure one model beats another: the mean of the blocks' differences over its standard error.
     pub(crate) fn z(&self, worse: &[f64], better: &[f64]) -> f64 {
         let (a, b) = (self.sums(worse), self.sums(better));

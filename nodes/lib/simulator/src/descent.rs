@@ -122,7 +122,7 @@ impl Fitter<'_> {
         self.around(state.point, Some(state.residuals), active)
     }
 
-    fn normal(&self, state: &State, columns: &[Residuals]) -> Normal {
+    pub(crate) fn normal(&self, state: &State, columns: &[Residuals]) -> Normal {
         let projected: Vec<Residuals> =
             columns.iter().map(|c| state.starts.project(&self.layout, c).0).collect();
         Normal::new(&self.layout, &state.projected, &projected.iter().collect::<Vec<_>>())

@@ -81,6 +81,8 @@ pub fn diagnose(
         })
     };
     let (nominal, left) = (error(&null), error(after));
+    // Nothing was fitted to it: every window counts, and one in which the car nearly spun does not make a gap.
+    let as_it_came = Scored::everywhere(layout, model.free.len()).estimate(&[&null], |e| e[0]).value;
     let free_closes = closed(after, &flexible.all);
     let z = scored.z(after, &flexible.all);
     let terms_help = z > SURE_Z && free_closes.value > MATTERS;
@@ -91,7 +93,7 @@ pub fn diagnose(
         () if is_missing => Verdict::MissingStructure,
         () if !found.fits.is_empty() => Verdict::Effects,
         // A few blocks may hold all of it: its lower end says nothing then.
-        () if nominal.value > NO_GAP * floor => Verdict::NoneOfThese,
+        () if as_it_came > NO_GAP * floor => Verdict::NoneOfThese,
         () => Verdict::NoGap,
     };
     // Beside missing structure a parameter may stand in for it: it is named where it closes more than the free terms do.
@@ -110,15 +112,17 @@ pub fn diagnose(
         .collect();
     missing.sort_by(|a, b| b.closed_fraction.total_cmp(&a.closed_fraction));
     let mut reasons = vec![Reason::Gap { nominal: nominal.value, after: left.value }];
-    reasons.extend(taken(&list, &found, &fitter));
+    reasons.extend(taken(&list, &found));
     if is_missing {
         reasons.push(Reason::Missing { closed_fraction: free_closes.value, z });
     }
     reasons.push(if imposed { Reason::SpeedImposed } else { Reason::SpeedSimulated });
     let state = found.state();
     let own_changes = found.fits.last().map(|f| f.sizes.as_slice()).unwrap_or_default();
+    // Parameters that stand in for a term do so on this drive: they are written down where they are most of the answer.
+    let is_mended = names_effects && (!is_missing || named_close.low > 0.5);
     let changes = own_changes.iter().filter_map(|s| match list[s.candidate].kind {
-        Kind::Own(_) if names_effects => Some((list[s.candidate].parameter.clone(), s.value)),
+        Kind::Own(_) if is_mended => Some((list[s.candidate].parameter.clone(), s.value)),
         _ => None,
     });
     Ok(SimulatorDiagnosis {
@@ -156,6 +160,7 @@ pub fn diagnose(
             took_s: [start.elapsed(), roll.busy() - busy].map(|t| t.as_secs_f64()),
         },
         changes: changes.collect(),
+        residuals: found.null.projected.clone(),
         fitted: list.iter().zip(&state.point.values).map(|(c, v)| (c.name.clone(), *v)).collect(),
         series: series(&drive, layout, [&found.null.projected, &state.projected]),
     })
@@ -170,7 +175,17 @@ pub enum Span {
     Whole,
 }
 
-/// Error of a simulator over the noise, with effects around it at given sizes: what a patch is verified by.
+/// What a simulator leaves of a drive.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Verified {
+    /// Mean square over the noise variance.
+    pub over_noise: f64,
+    /// Whether it is below that of the simulator as it came by more than noise gives.
+    pub is_clearly_less: bool,
+}
+
+/// Error of a simulator over the noise, with effects around it at given sizes: what a patch is verified by. `as_it_came`: the residuals of a
+/// diagnosis of the same drive ([`SimulatorDiagnosis::residuals`]).
 ///
 /// # Errors
 /// [`SimulatorError`].
@@ -179,7 +194,8 @@ pub fn error_over(
     question: &Question<'_>,
     around: &[(String, f64)],
     span: Span,
-) -> Result<f64, SimulatorError> {
+    as_it_came: &[f64],
+) -> Result<Verified, SimulatorError> {
     let description = roll.description();
     let imposed = description.imposes_v_x && question.file.v_x == ForwardSpeed::Auto;
     let mut wanted = vec![Channel::VYMps, Channel::YawRateRadps];
@@ -201,7 +217,10 @@ pub fn error_over(
     }
     let state = fitter.at(point)?;
     let scored = Scored::new(&fitter.layout, model.free.len());
-    Ok(scored.estimate(&[&window_squares(&fitter.layout, &state.projected)], |e| e[0]).value)
+    let squares = window_squares(&fitter.layout, &state.projected);
+    let is_clearly_less =
+        as_it_came.len() == state.projected.len() && scored.is_clearly_better(as_it_came, &state.projected);
+    Ok(Verified { over_noise: scored.estimate(&[&squares], |e| e[0]).value, is_clearly_less })
 }
 
 fn effects(
@@ -275,13 +294,12 @@ fn unit_error(c: &Candidate, low: f64, high: f64, file: &SimulatorFile) -> Optio
         .map(|(name, ratio)| UnitError { name, ratio })
 }
 
-fn taken(list: &[Candidate], found: &Found, fitter: &Fitter<'_>) -> Vec<Reason> {
-    let needed = fitter.needed();
+fn taken(list: &[Candidate], found: &Found) -> Vec<Reason> {
     let mut out = Vec::new();
     for (fit, round) in found.fits.iter().zip(&found.rounds) {
         let Some(size) = fit.sizes.last() else { continue };
         let name = list[size.candidate].name.clone();
-        out.push(Reason::Taken { name: name.clone(), wald: size.wald, needed });
+        out.push(Reason::Taken { name: name.clone(), wald: size.wald, needed: size.needed });
         if !round.confused.is_empty() {
             let with = round.confused.iter().map(|&c| list[c].name.clone()).collect();
             out.push(Reason::Confused { name, with });

@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use crate::SimulatorError;
-use crate::linear::{Layout, Normal, Starts, student_95, window_costs};
+use crate::linear::{Layout, Normal, Starts, student, window_costs};
 use crate::model::{Model, Point, Residuals};
 
 /// A point, with what the simulator says there.
@@ -38,6 +38,16 @@ pub(crate) struct Size {
     pub(crate) high: f64,
     /// Square of the distance from the null over the standard error.
     pub(crate) wald: f64,
+    /// What that must exceed.
+    pub(crate) needed: f64,
+}
+
+/// Chance, at each side, that a recording of a car that is as the simulator gets anything named.
+const FALSE: f64 = 0.01;
+
+/// What the largest of some sizes over their standard errors, squared, exceeds by chance (Bonferroni). The errors are themselves estimated.
+pub(crate) fn needed(candidates: usize, freedom: f64) -> f64 {
+    student(FALSE / candidates.max(1) as f64, freedom).powi(2)
 }
 
 impl State {
@@ -244,16 +254,18 @@ impl<'a> Fitter<'a> {
         let projected: Vec<Residuals> =
             columns.iter().map(|c| state.starts.project(&self.layout, c).0).collect();
         let normal = Normal::new(&self.layout, &state.projected, &projected.iter().collect::<Vec<_>>());
-        let known = normal.covariance();
+        let known = normal.known();
+        let candidates = self.model.candidates.len();
         let size = |(place, &c): (usize, &usize)| {
             let value = state.point.values[c];
             let null = self.model.candidates[c].null;
-            let (error, freedom) = known.as_ref().map_or((f64::INFINITY, 1.0), |(cov, freedom)| {
-                (cov[(place, place)].max(0.0).sqrt(), *freedom)
+            let (error, freedom) = known.as_ref().map_or((f64::INFINITY, 1.0), |k| {
+                (k.covariance[(place, place)].max(0.0).sqrt(), k.freedom[place])
             });
-            let reach = student_95(freedom) * error;
+            let reach = student(0.05, freedom) * error;
             let wald = if error > 0.0 { ((value - null) / error).powi(2) } else { 0.0 };
-            Size { candidate: c, value, low: value - reach, high: value + reach, wald }
+            let needed = needed(candidates, freedom);
+            Size { candidate: c, value, low: value - reach, high: value + reach, wald, needed }
         };
         active.iter().enumerate().map(size).collect()
     }

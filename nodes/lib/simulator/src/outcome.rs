@@ -266,6 +266,9 @@ pub struct SimulatorDiagnosis {
     /// The simulator's parameters that are named, with their new values: what a patch would write.
     #[serde(skip)]
     pub changes: Vec<(String, f64)>,
+    /// Residuals of the simulator as it came, over the noise and less what other starts explain, for a verification.
+    #[serde(skip)]
+    pub residuals: Vec<f64>,
     /// Values of all candidates and starts with the sensors' effects, for a verification.
     #[serde(skip)]
     pub fitted: Vec<(String, f64)>,

@@ -5,13 +5,13 @@
 //! taken where
 //!
 //! ```text
-//! (size / standard error)^2  >  log(clusters) + 2 log(candidates)        (extended BIC, with errors robust to clusters)
+//! |size / standard error|  >  t(1 % / candidates; degrees of freedom)        (Student, errors robust to clusters; both sides: 2 % in all)
 //! ```
 //!
 //! and the windows that no fit has seen are predicted better, too.
 
 use crate::SimulatorError;
-use crate::fit::{Fitted, Fitter, State};
+use crate::fit::{Fitted, Fitter, State, needed};
 use crate::linear::Normal;
 use crate::model::Residuals;
 
@@ -98,6 +98,10 @@ impl Fitter<'_> {
                 None => break,
             }
         }
+        if let Some(last) = found.fits.last_mut() {
+            progress("what the sizes are worth");
+            self.widen(last)?;
+        }
         Ok(found)
     }
 
@@ -107,7 +111,7 @@ impl Fitter<'_> {
         for k in (0..found.fits.len().saturating_sub(1)).rev() {
             let Some(last) = found.fits.last() else { return Ok(()) };
             // Where rollouts are short, a size far beyond its error says enough.
-            let is_clear = last.sizes.get(k).is_some_and(|s| s.wald > 4.0 * self.needed());
+            let is_clear = last.sizes.get(k).is_some_and(|s| s.wald > 4.0 * s.needed);
             if is_clear && self.rollouts() + FIT > MOST_ROLLOUTS {
                 continue;
             }
@@ -145,10 +149,9 @@ impl Fitter<'_> {
         self.fit(start.as_ref().unwrap_or(&end.state), first, columns, 3)
     }
 
-    /// What a size over its standard error, squared, must exceed.
+    /// What a size over its standard error, squared, must exceed where every window tells of it.
     pub(crate) fn needed(&self) -> f64 {
-        let clusters = self.layout.training().count().min(40) as f64;
-        clusters.ln() + 2.0 * (self.model.candidates.len().max(1) as f64).ln()
+        needed(self.model.candidates.len(), (self.layout.clusters().1 as f64 - 1.0).max(1.0))
     }
 
     fn round(&self, found: &mut Found) -> Result<(Round, Option<Fitted>), SimulatorError> {
@@ -197,7 +200,7 @@ impl Fitter<'_> {
             fits.push(fit(*c, trial)?);
         }
         let left = fits.iter().map(|f| f.state.training(layout)).fold(before, f64::min);
-        let affordable = self.rollouts() + self.zooming() + FIT <= MOST_ROLLOUTS;
+        let affordable = self.rollouts() + self.zooming() <= MOST_ROLLOUTS;
         if !found.zoomed && affordable && left > (UNEXPLAINED * self.residuals()).max(SLOW * before) {
             found.zoomed = true;
             if let Some((c, trial)) = self.zoom(&state, &active)? {
@@ -241,7 +244,7 @@ impl Fitter<'_> {
             round.confused.retain(|c| *c != now);
             round.confused.push(was);
         }
-        let evident = chosen.sizes.last().is_some_and(|s| s.wald > needed);
+        let evident = chosen.sizes.last().is_some_and(|s| s.wald > s.needed);
         let carries_over = chosen.state.held_out(layout) < state.held_out(layout);
         Ok((round, (evident && carries_over).then(|| chosen.clone())))
     }

@@ -23,8 +23,8 @@ pub struct PatchSaid {
     pub by_hand: Vec<String>,
     /// Error over the noise of the patched simulator on held-out data; nothing where it was not run.
     pub verified: Option<f64>,
-    /// Whether it was withheld because it made held-out data worse.
-    pub is_worse: bool,
+    /// Whether it was withheld because held-out data are not clearly better with it.
+    pub is_no_better: bool,
 }
 
 /// What the page shows.
@@ -117,7 +117,7 @@ fn patch(d: &SimulatorDiagnosis, said: &PatchSaid) -> Markup {
         @if let Some(error) = said.verified {
             p { "Run with the patch on held-out data: " (significant(d.gap.nominal.value, 3)) " to " (significant(error, 3)) " times the noise." }
         }
-        @if said.is_worse { p { "The patched simulator does worse on held-out data: no patch is given." } }
+        @if said.is_no_better { p { "The patched simulator does no better on held-out data, as far as these tell: no patch is given." } }
         @else if !said.diff.is_empty() { pre { (said.diff) } }
         @else { p { "Nothing of the parameter file is to be changed." } }
         (list(&said.by_hand, ""))

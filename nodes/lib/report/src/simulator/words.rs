@@ -154,8 +154,11 @@ pub fn simulator_text(d: &SimulatorDiagnosis, patch: &PatchSaid, data_notes: &[S
     }
     lines(&mut out, "missing    ", &missing(d));
     lines(&mut out, "invisible  ", &invisible(d));
-    if patch.is_worse {
-        let _ = writeln!(out, "patch      none: the patched simulator does worse on held-out data");
+    if patch.is_no_better {
+        let _ = writeln!(
+            out,
+            "patch      none: the patched simulator does no better on held-out data, as far as these tell"
+        );
     } else if let Some(error) = patch.verified {
         let from = significant(g.nominal.value, 3);
         let _ = writeln!(out, "patch      verified: {from} to {} times the noise", significant(error, 3));
