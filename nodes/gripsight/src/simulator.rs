@@ -11,6 +11,7 @@ use gripsight_simulator::{
     Commands, Question, Roll as _, Simulator, SimulatorDiagnosis, SimulatorFile, Span, diagnose, error_over,
     patch,
 };
+use gripsight_vehicle::VehicleParameters;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -64,7 +65,11 @@ pub(crate) fn run(args: &DiagnoseArgs, simulator_file: &Path) -> anyhow::Result<
     let start = Instant::now();
     outputs::check(&args.out, &["gap.json", "report.html", "timing.json", PATCH_FILE], None, &[&args.bag])?;
     let topics = args.topics.as_deref().map(TopicMap::read).transpose()?.unwrap_or_default();
-    let vehicle = vehicle(args.vehicle.as_deref())?;
+    // The simulator brings the car's figures: without a file only the report's name of the car is missing.
+    let vehicle = match &args.vehicle {
+        Some(path) => vehicle(Some(path))?,
+        None => VehicleParameters::f1tenth(),
+    };
     let file = SimulatorFile::read(simulator_file)?;
     let (sequence, report) = read(&args.bag, &topics)?;
     let commands = Commands::of(&sequence);
