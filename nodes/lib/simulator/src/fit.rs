@@ -245,9 +245,12 @@ impl<'a> Fitter<'a> {
             .collect())
     }
 
+    /// A value that a candidate can have. A count near a whole number is that number: between two every rollout is two.
     pub(crate) fn within(&self, candidate: usize, value: f64) -> f64 {
+        const NEAR: f64 = 0.2;
         let c = &self.model.candidates[candidate];
-        value.clamp(c.low, c.high)
+        let is_whole = c.integer && (value - value.round()).abs() < NEAR;
+        if is_whole { value.round() } else { value }.clamp(c.low, c.high)
     }
 
     pub(crate) fn sizes(&self, state: &State, active: &[usize], columns: &[Residuals]) -> Vec<Size> {

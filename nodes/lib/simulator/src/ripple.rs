@@ -75,8 +75,13 @@ impl Fitter<'_> {
             .filter_map(|(j, by)| {
                 let others = inverse.column(*j) * (by / inverse[(*j, *j)]);
                 let mut values = state.point.values.clone();
-                active.iter().zip(others.iter()).for_each(|(&c, d)| values[c] += d);
-                let is_inside = active.iter().all(|&c| self.within(c, values[c]) == values[c]);
+                for (&c, d) in active.iter().zip(others.iter()) {
+                    // Counts stay whole.
+                    let is_count = self.model.candidates[c].integer;
+                    values[c] = if is_count { self.within(c, values[c] + d) } else { values[c] + d };
+                }
+                let bounds = |c: usize| self.model.candidates[c].low..=self.model.candidates[c].high;
+                let is_inside = active.iter().all(|&c| bounds(c).contains(&values[c]));
                 is_inside.then_some((*j, others, values))
             })
             .collect();
