@@ -8,6 +8,9 @@ use crate::tires::{TireSet, Trust};
 
 /// Share of the most likely peak to explore up to, where it was not reached.
 const LIKELY: f64 = 0.96;
+/// Grip planned over what half a lap was driven with without a slide, however little a set promises: from a drive that showed little the promise may be
+/// below what the car has done, and a plan held there would show no more.
+const PROVEN: f64 = 1.05;
 /// Share of an assumed grip to begin with: what nobody measured is no promise.
 pub(super) const CAREFUL: f64 = 0.5;
 /// Grip planned over what the car turned with, up to an assumed grip.
@@ -73,20 +76,20 @@ impl Driver {
         let over = self.named.grip.map_or(1.0, |[front, rear]| front.min(rear));
         let likely_peak = base.likely_peak.map(|peak| over * peak);
         let likely = likely_peak.unwrap_or(f64::INFINITY);
-        let bold = (step * driven).min(beyond * shown);
+        let proven = PROVEN.min(step) * self.driven;
+        let most = (beyond * shown).max(proven);
+        let bold = (step * driven).min(most);
         let alone = match base.trust {
             Trust::Assumed => careful.max(self.driven).min(share * shown),
             Trust::Accepted => bold.min(share * likely_peak.unwrap_or(shown)).max(share * shown),
-            Trust::AcceptedWithin => bold.min(LIKELY * likely).max(share * shown),
+            Trust::AcceptedWithin => bold.min((LIKELY * likely).max(self.driven)).max(share * shown),
             Trust::Provisional => share * shown,
         };
         let grip = match &self.prior {
             _ if base.trust == Trust::Accepted => alone,
             // A prior below what was driven and a step is no reason to drive slower, unless nothing was shown.
             Some(prior) if base.trust == Trust::Assumed => (share * prior.grip()).min(prior_step * driven),
-            Some(prior) => {
-                (LIKELY * prior.grip().min(likely)).max(alone).min(prior_step * driven).min(beyond * shown)
-            }
+            Some(prior) => (LIKELY * prior.grip().min(likely)).max(alone).min(prior_step * driven).min(most),
             None => alone,
         };
         self.caught.map_or(grip, |caught| grip.min(caught))

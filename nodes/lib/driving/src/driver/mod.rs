@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | nothing | half of the start's, and a step beyond what the car turned with, up to the start's |
 //! | accepted: the peak is known | a share of the most likely peak, step by step from what the set promises |
-//! | accepted within what was shown | a step beyond what was driven, so that the next drive shows more, up to the most likely peak |
+//! | accepted within what was shown | a step beyond what was driven, so that the next drive shows more, up to the most likely peak; no less than was driven |
 //! | a prior's peak (provisional) | up to that and to the peak that the data find most likely, in larger steps |
 //! | the car slid, or the identifier warns | what the road gave, until a set knows better |
 

@@ -240,6 +240,11 @@ fn sets_are_taken_for_what_they_are_good_for() {
     approx::assert_relative_eq!(within.grip(), settings.step * start, max_relative = 1e-2);
     within.take(TireSet { likely_peak: Some(0.55), ..set(0.48, Trust::AcceptedWithin) }).unwrap();
     approx::assert_relative_eq!(within.grip(), 0.96 * 0.55, max_relative = 1e-2);
+    // What the car has done is no less for a set from a drive that showed little.
+    within.take(set(0.25, Trust::AcceptedWithin)).unwrap();
+    approx::assert_relative_eq!(within.grip(), 1.05 * start, max_relative = 1e-2);
+    within.take(TireSet { likely_peak: Some(0.3), ..set(0.25, Trust::AcceptedWithin) }).unwrap();
+    approx::assert_relative_eq!(within.grip(), start, max_relative = 1e-2);
 
     // A prior that promises more: a larger step and no more than that. One that promises less is no reason to slow down.
     for (prior, expected) in [(2.0, settings.prior_step * start), (0.3, settings.step * start)] {
