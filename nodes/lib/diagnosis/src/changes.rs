@@ -7,6 +7,8 @@
 //! ```text
 //! cost(theta, delta) = cost_earlier(theta) / phi_earlier + cost_later(theta + delta) / phi_later
 //! ```
+//!
+//! What two drives of an unchanged car differ by, since the model does not carry over from one stretch of road to another, is in [`Between`].
 
 use gripsight_estimation::selection::{ColumnPrior, Quadratic, Selection, Term, configuration, select};
 use gripsight_model::{BASE, EffectId, Site, TIRES};
@@ -16,6 +18,7 @@ use crate::decisions;
 use crate::engine::Engine;
 
 use crate::answer::Change;
+use crate::between::Between;
 use crate::infer::FIRST;
 use crate::inferred::Inferred;
 use crate::outcome::EffectParameter;
@@ -27,6 +30,8 @@ const SAME: f64 = 0.03;
 const SAME_FLEXIBLE: f64 = 0.5;
 /// Standard deviation of a change of the tires, over that of tires that are the same.
 const OTHER_TIRES: f64 = 10.0;
+/// Share of a dispersion above which it is the same.
+const SETTLED: f64 = 0.95;
 /// Half width of a 90 % interval in standard deviations.
 const NINETY: f64 = 1.645;
 
@@ -48,28 +53,46 @@ pub(crate) fn compare(engine: &Engine<'_>, earlier: &Inferred, later: &Inferred)
     let (a, b) = (scaled(earlier), scaled(later));
     // The later drive was linearised elsewhere: its gradient where the earlier one was.
     let apart = DVector::from_fn(n, |i, _| earlier.values[i] - later.values[i]);
-    let b_gradient = &b.gradient + &b.information * apart;
-    let mut problem =
-        Quadratic { information: DMatrix::zeros(2 * n, 2 * n), gradient: DVector::zeros(2 * n) };
-    problem.information.view_mut((0, 0), (n, n)).copy_from(&(&a.information + &b.information));
-    for (row, column) in [(0, n), (n, 0), (n, n)] {
-        problem.information.view_mut((row, column), (n, n)).copy_from(&b.information);
-    }
-    problem.gradient.rows_mut(0, n).copy_from(&(&a.gradient + &b_gradient));
-    problem.gradient.rows_mut(n, n).copy_from(&b_gradient);
+    let here = Quadratic { gradient: &b.gradient + &b.information * apart, information: b.information };
+    let between = Between::of(earlier, later)?;
+    // The columns: the earlier drive's parameters, their changes, and what else sets the later drive apart.
+    let random = between.root.ncols();
+    let mut both = DMatrix::zeros(n, 2 * n + random);
+    both.view_mut((0, 0), (n, n)).fill_with_identity();
+    both.view_mut((0, n), (n, n)).fill_with_identity();
+    both.view_mut((0, 2 * n), (n, random)).copy_from(&between.root);
+    let mut problem = Quadratic {
+        information: both.tr_mul(&(&here.information * &both)),
+        gradient: both.tr_mul(&here.gradient),
+    };
+    let mut of_earlier = problem.information.view_mut((0, 0), (n, n));
+    of_earlier += &a.information;
+    let mut of_earlier = problem.gradient.rows_mut(0, n);
+    of_earlier += &a.gradient;
     let mut terms = earlier.terms.clone();
-    terms.extend(differences(engine, earlier));
+    terms.extend(differences(engine, earlier, &between));
     let mut start = earlier.selection.best.clone();
     start.resize(terms.len(), 0);
-    let mut selection = select(&problem, 1.0, &terms, &start, 23)?;
+    // What the drives contradict each other by is at first all a failing of the model. What is so large that it stands out all the same is a change, explains
+    // its share of the contradictions, and lets smaller ones stand out.
+    let mut dispersion = between.dispersion(&here, &DVector::zeros(n));
+    let mut selection = select(&problem, dispersion, &terms, &start, 23)?;
+    loop {
+        let left = between.dispersion(&here, &selection.best_step.rows(n, n).into_owned());
+        if left > SETTLED * dispersion {
+            break;
+        }
+        dispersion = left;
+        selection = select(&problem, dispersion, &terms, &selection.best, 23)?;
+    }
     // A difference that no effect does is worth a word only where it closes as much as free terms must in a drive by itself.
-    while let Some(needless) = needless(&problem, &terms, &selection.best, earlier, later) {
+    while let Some(needless) = needless(&problem, dispersion, &terms, &selection.best, earlier, later) {
         for t in needless {
             terms[t] = terms[t].only(0);
         }
         let start: Vec<usize> =
             selection.best.iter().zip(&terms).map(|(a, t)| (*a).min(t.log_weights.len() - 1)).collect();
-        selection = select(&problem, 1.0, &terms, &start, 23)?;
+        selection = select(&problem, dispersion, &terms, &start, 23)?;
     }
     Some(Compared { selection, columns: n, terms: earlier.terms.len() })
 }
@@ -77,13 +100,14 @@ pub(crate) fn compare(engine: &Engine<'_>, earlier: &Inferred, later: &Inferred)
 /// The free terms of a site's difference that close too little of the later drive's error, those that close least first.
 fn needless(
     problem: &Quadratic,
+    dispersion: f64,
     terms: &[Term],
     best: &[usize],
     earlier: &Inferred,
     later: &Inferred,
 ) -> Option<std::ops::Range<usize>> {
     let cost = |chosen: &[usize]| {
-        let step = configuration(problem, 1.0, terms, chosen)?.step;
+        let step = configuration(problem, dispersion, terms, chosen)?.step;
         Some(2.0 * problem.gradient.dot(&step) + (&problem.information * &step).dot(&step))
     };
     let whole = cost(best)?;
@@ -101,7 +125,7 @@ fn needless(
 }
 
 /// The differences as terms: nothing to speak of, or a change.
-fn differences(engine: &Engine<'_>, earlier: &Inferred) -> Vec<Term> {
+fn differences(engine: &Engine<'_>, earlier: &Inferred, between: &Between) -> Vec<Term> {
     let n = earlier.columns.len();
     let unbounded = [f64::NEG_INFINITY, f64::INFINITY];
     let weights = || vec![(1.0 - decisions::PRIOR).ln(), decisions::PRIOR.ln()];
@@ -146,13 +170,16 @@ fn differences(engine: &Engine<'_>, earlier: &Inferred) -> Vec<Term> {
     for site in Site::ALL {
         let range = earlier.columns.of_site(site);
         let weight = decisions::PRIOR / range.len() as f64;
-        let prior = |column: usize| ColumnPrior {
-            offset: 0.0,
-            sigma: vec![
-                SAME_FLEXIBLE * decisions::usual_flexible(site, column - range.start),
-                decisions::FLEXIBLE_WIDE,
-            ],
-            bounds: unbounded,
+        // What the library lacks at a site depends on the ground: over another one it is as large, and another.
+        let lacking =
+            range.clone().map(|c| earlier.values[c].abs()).fold(0.0, f64::max) * between.of_one.sqrt();
+        let prior = |column: usize| {
+            let same = lacking.hypot(SAME_FLEXIBLE * decisions::usual_flexible(site, column - range.start));
+            ColumnPrior {
+                offset: 0.0,
+                sigma: vec![same, same.hypot(decisions::FLEXIBLE_WIDE)],
+                bounds: unbounded,
+            }
         };
         out.extend(range.clone().map(|column| Term {
             from: n + column,
@@ -160,6 +187,8 @@ fn differences(engine: &Engine<'_>, earlier: &Inferred) -> Vec<Term> {
             log_weights: vec![(1.0 - weight).ln(), weight.ln()],
         }));
     }
+    let random = ColumnPrior { offset: 0.0, sigma: vec![1.0], bounds: unbounded };
+    out.push(Term { from: 2 * n, priors: vec![random; between.root.ncols()], log_weights: vec![0.0] });
     out
 }
 
@@ -252,7 +281,7 @@ impl Compared {
         }
         out.retain(|c| c.probability >= decisions::LISTED);
         out.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-        debug_assert_eq!(self.selection.best_step.len(), 2 * self.columns);
+        debug_assert!(self.selection.best_step.len() > 2 * self.columns);
         out
     }
 }

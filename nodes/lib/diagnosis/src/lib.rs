@@ -24,6 +24,7 @@
 
 mod answer;
 mod around;
+mod between;
 mod budget;
 mod changes;
 mod columns;

@@ -159,7 +159,7 @@ fn active(around: &Around<'_, '_>, terms: &[Term], chosen: &[usize]) -> Vec<Acti
 }
 
 /// The 95 % quantile of Student's t distribution: tabled up to ten degrees of freedom, where it is within 10 % of the normal's.
-fn ninety_of_t(degrees: f64) -> f64 {
+pub(crate) fn ninety_of_t(degrees: f64) -> f64 {
     const TABLE: [f64; 10] = [6.314, 2.920, 2.353, 2.132, 2.015, 1.943, 1.895, 1.860, 1.833, 1.812];
     let place = degrees.max(1.0) as usize - 1;
     TABLE.get(place).copied().unwrap_or(NINETY + 0.167 * 10.0 / degrees)
