@@ -39,6 +39,8 @@ const NINETY: f64 = 1.645;
 #[derive(Debug, Clone)]
 pub(crate) struct Compared {
     selection: Selection,
+    /// How many times larger than they may be the contradictions are that no change explains.
+    pub(crate) dispersion: f64,
     columns: usize,
     terms: usize,
 }
@@ -94,7 +96,7 @@ pub(crate) fn compare(engine: &Engine<'_>, earlier: &Inferred, later: &Inferred)
             selection.best.iter().zip(&terms).map(|(a, t)| (*a).min(t.log_weights.len() - 1)).collect();
         selection = select(&problem, dispersion, &terms, &start, 23)?;
     }
-    Some(Compared { selection, columns: n, terms: earlier.terms.len() })
+    Some(Compared { selection, dispersion, columns: n, terms: earlier.terms.len() })
 }
 
 /// The free terms of a site's difference that close too little of the later drive's error, those that close least first.
@@ -170,11 +172,12 @@ fn differences(engine: &Engine<'_>, earlier: &Inferred, between: &Between) -> Ve
     for site in Site::ALL {
         let range = earlier.columns.of_site(site);
         let weight = decisions::PRIOR / range.len() as f64;
-        // What the library lacks at a site depends on the ground: over another one it is as large, and another.
-        let lacking =
-            range.clone().map(|c| earlier.values[c].abs()).fold(0.0, f64::max) * between.of_one.sqrt();
+        // What the library lacks at a site depends on the ground: over another one it is as large, and another; two of
+        // that size differ by sqrt 2 times it.
+        let lacking = range.clone().map(|c| earlier.values[c].abs()).fold(0.0, f64::max);
+        let apart = lacking * (2.0 * between.of_one).sqrt();
         let prior = |column: usize| {
-            let same = lacking.hypot(SAME_FLEXIBLE * decisions::usual_flexible(site, column - range.start));
+            let same = apart.hypot(SAME_FLEXIBLE * decisions::usual_flexible(site, column - range.start));
             ColumnPrior {
                 offset: 0.0,
                 sigma: vec![same, same.hypot(decisions::FLEXIBLE_WIDE)],

@@ -78,9 +78,10 @@ impl Earlier {
         let like = &self.inferred;
         let mut alike = Engine::new(recording, vehicle, like.tires, TireTrust::file());
         let (mut values, mut chosen) = (like.values.clone(), like.chosen.clone());
-        let mut compared = None;
+        let mut best: Option<(Inferred, Differences)> = None;
         // First where the earlier drive was linearised: fits may end apart although nothing has changed. Where something has, around the
-        // later drive's own fits: from the earlier model on, then from what that comparison makes of it.
+        // later drive's own fits: from the earlier model on, then from what that comparison makes of it. Where the drives contradict each other
+        // the least they are compared at their best.
         for comparison in 0..=COMPARISONS {
             let at = (&values[..], &chosen[..]);
             let later =
@@ -90,12 +91,15 @@ impl Earlier {
             if comparison > 0 {
                 (values, chosen) = differences.later(&alike, self);
             }
-            compared = Some((later, differences));
-            if same {
+            let left = differences.compared.dispersion;
+            if best.as_ref().is_none_or(|(_, b)| left <= b.compared.dispersion) {
+                best = Some((later, differences));
+            }
+            if same && comparison > 0 {
                 break;
             }
         }
-        compared.ok_or(GapError::NotFinite)
+        best.ok_or(GapError::NotFinite)
     }
 
     /// What differs in a later drive that was linearised in the same columns.
