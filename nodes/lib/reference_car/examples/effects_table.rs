@@ -108,9 +108,8 @@ fn markdown(effect: &EffectSpec, size: &str, mut rows: Vec<Row>) -> String {
     } else {
         "everywhere".into()
     };
-    let outside = if effect.in_library { "" } else { " (outside the library)" };
     format!(
-        "| `{}`{outside} | {size} | {channel} | {:.2e} {unit} | {:.2} | {place} | {} |",
+        "| `{}` | {size} | {channel} | {:.2e} {unit} | {:.2} | {place} | {} |",
         effect.name,
         first.rms,
         first.over_noise,

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use gripsight_model::EffectId;
 use gripsight_reference_car::{
     CarParameters, Course, DriverKind, EFFECTS, EffectSetting, EffectSpec, Friction, Scenario, Track,
     effect_spec,
@@ -193,7 +194,7 @@ pub(crate) fn beyond_usual(car: &CarParameters, mu: f64, setting: &EffectSetting
 
 /// Names of the library's effects, or of those that it does not have.
 pub(crate) fn names(in_library: bool) -> Vec<&'static str> {
-    EFFECTS.iter().filter(|e| e.in_library == in_library).map(|e| e.name).collect()
+    EFFECTS.iter().filter(|e| EffectId::by_name(e.name).is_some() == in_library).map(|e| e.name).collect()
 }
 
 /// So many names, one or two.
@@ -295,6 +296,13 @@ mod tests {
             assert!(!kept.contains(&"gyro_bias".to_owned()) && deleted.contains(&"gyro_bias".to_owned()));
             assert!(deleted.is_sorted());
         }
+    }
+
+    #[test]
+    fn the_library_itself_says_what_it_has() {
+        let outside = ["cross_wind", "gusts", "tire_asymmetry", "steering_map", "camber_thrust", "drive_lag"];
+        assert_eq!(names(false), outside);
+        assert_eq!(names(true).len() + outside.len(), EFFECTS.len());
     }
 
     #[test]
