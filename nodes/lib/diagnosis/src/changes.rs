@@ -200,9 +200,12 @@ impl Compared {
         self.selection.probability[self.terms + term].last().copied().unwrap_or(0.0)
     }
 
-    /// Probability that an effect differs.
+    /// Probability that an effect differs: that of the fit, and no more than the chance that such a size is a cause.
     pub(crate) fn of_effect(&self, earlier: &Inferred, effect: EffectId) -> f64 {
-        earlier.term_of(effect).filter(|_| earlier.is_open(effect)).map_or(0.0, |t| self.probability(t))
+        let Some(term) = earlier.term_of(effect).filter(|_| earlier.is_open(effect)) else { return 0.0 };
+        let told = |(mean, sigma): (Vec<f64>, Vec<f64>)| mean[0].abs() / (NINETY * sigma[0]);
+        let told = self.difference(earlier, effect).map_or(0.0, told);
+        self.probability(term).min(decisions::chance(told))
     }
 
     /// Probability that the tires differ.

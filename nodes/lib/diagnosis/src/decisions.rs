@@ -50,11 +50,20 @@ pub(crate) const SHARED_ERROR: f64 = 0.04;
 /// Chance that an effect which is left in the model is a cause: coefficients of the logarithm of the odds. A constant, then the logarithm of its size over the
 /// half width of its interval, over [`CHANCE_UNIT`]. `tests/results/withheld/fit_chance.py` fits them on development cases of seeds 11, 12 (reference car) and 771
 /// (foreign plants). The share that held-out data need an effect for tells nothing on top: with its logarithm beside them the coefficients are 0.35, -0.01, 3.14.
-pub(crate) const CHANCE: [f64; 2] = [0.35, 3.13];
+const CHANCE: [f64; 2] = [0.35, 3.13];
 
 /// Unit of the sign that [`CHANCE`] is counted in, and what tells no less than less.
-pub(crate) const CHANCE_UNIT: f64 = 2.5;
-pub(crate) const CHANCE_LEAST: f64 = 0.1;
+const CHANCE_UNIT: f64 = 2.5;
+const CHANCE_LEAST: f64 = 0.1;
+
+/// Chance that an effect in the model is a cause, and that a difference between two drives is a change, whose size is so many half widths of its 90 % interval
+/// away from nothing.
+pub(crate) fn chance(size_over_half_width: f64) -> f64 {
+    let [constant, by_size] = CHANCE;
+    let size = size_over_half_width.max(CHANCE_LEAST);
+    let log_odds = constant + by_size * (size / CHANCE_UNIT).ln();
+    1.0 / (1.0 + (-log_odds).exp())
+}
 
 /// Chance from which the verdict names an effect: on the cases above 136 of 160 causes, and 10 others, one of them in a drive without effect.
 pub(crate) const NAMED: f64 = 0.6;

@@ -23,10 +23,7 @@ pub(crate) struct Statement {
 impl Statement {
     /// Chance that the effect, or what does nearly the same, is a cause.
     pub(crate) fn chance_of_alike(&self) -> f64 {
-        let [constant, by_size] = decisions::CHANCE;
-        let size = self.size_over_half_width.max(decisions::CHANCE_LEAST);
-        let log_odds = constant + by_size * (size / decisions::CHANCE_UNIT).ln();
-        1.0 / (1.0 + (-log_odds).exp())
+        decisions::chance(self.size_over_half_width)
     }
 
     /// Chance that one of the candidates that do nearly the same is a cause: what is not among the candidates has its share.
