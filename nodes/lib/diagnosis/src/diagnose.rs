@@ -94,14 +94,10 @@ pub fn diagnose(request: &Request<'_>, progress: &mut dyn FnMut(&str)) -> Result
     let data_health = DataHealth::of(request.sequence)?;
     match usable(request, &data_health) {
         Ok(usable) => {
-            let recording = request.together.is_some().then(|| usable.recording.clone());
-            let (diagnosis, inferred) = explain(request, usable, data_health, progress)?;
-            let (Some(together), Some(recording)) = (&request.together, recording) else {
-                return Ok(diagnosis);
-            };
-            let all = Earlier::of(diagnosis, inferred, recording);
-            let contradicts = drives::contradictions(&all, together, request, progress)?;
-            drives::of_one_state(all.diagnosis, contradicts, together, request, progress)
+            let (diagnosis, _) = explain(request, usable, data_health, progress)?;
+            let Some(together) = &request.together else { return Ok(diagnosis) };
+            let contradicts = drives::contradictions(together, request, progress)?;
+            drives::of_one_state(diagnosis, contradicts, together, request, progress)
         }
         Err(error) if cannot_tell(&error) => Ok(refused(request, &error, data_health)),
         Err(error) => Err(error),

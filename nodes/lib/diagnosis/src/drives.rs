@@ -81,10 +81,9 @@ fn within(recording: &Recording, windows: &Windows, [from_s, to_s]: [f64; 2]) ->
 /// What differs in each drive from the others; `None` of a drive that cannot be compared.
 type Differing = Vec<Option<Vec<Change>>>;
 
-/// What differs in each drive from what all of them give or, where drives do differ, from the drive that most of them agree with: what drives in unlike
-/// states give together is the state of none.
+/// What differs in each drive from the drive that most of them agree with: what drives in unlike states give together is the state of none, and
+/// lacks so much that anything agrees with it.
 pub(crate) fn contradictions(
-    all: &Earlier,
     together: &Together<'_>,
     request: &Request<'_>,
     progress: &mut dyn FnMut(&str),
@@ -94,23 +93,16 @@ pub(crate) fn contradictions(
         let health = DataHealth::of(drive)?;
         drives.push(usable(&Request::new(drive, request.vehicle), &health).ok());
     }
-    let mut most = held_against(all, &drives, request, progress, "all of them")?;
+    let mut most: Differing = vec![None; drives.len()];
     let agreeing = |of: &Differing| of.iter().flatten().filter(|c| c.is_empty()).count();
-    if agreeing(&most) == most.iter().flatten().count() {
-        return Ok(most);
-    }
-    let mut count = 0;
     for (number, drive) in together.alone.iter().enumerate().filter(|(i, _)| drives[*i].is_some()) {
         let alone = Request { sequence: drive, held_out: None, together: None, ..request.clone() };
         let Ok(reference) = Earlier::diagnosed(&alone, progress) else { continue };
-        let mut found =
-            held_against(&reference, &drives, request, progress, &format!("drive {}", number + 1))?;
-        found[number] = Some(Vec::new());
-        if agreeing(&found) > count {
-            count = agreeing(&found);
+        let found = held_against(&reference, number, &drives, request, progress)?;
+        if agreeing(&found) > agreeing(&most) {
             most = found;
         }
-        if 2 * count > most.iter().flatten().count() {
+        if 2 * agreeing(&most) > most.iter().flatten().count() {
             break;
         }
     }
@@ -161,22 +153,27 @@ pub(crate) fn of_one_state(
     Ok(diagnosis)
 }
 
-/// What differs in each drive from a reference, which it may be part of: its difference then is known somewhat better than is stated.
+/// What differs in each drive from the drive `number`.
 fn held_against(
     reference: &Earlier,
+    number: usize,
     drives: &[Option<Usable>],
     request: &Request<'_>,
     progress: &mut dyn FnMut(&str),
-    name: &str,
 ) -> Result<Differing, GapError> {
     let mut out = Vec::new();
-    for (number, drive) in drives.iter().enumerate() {
+    for (other, drive) in drives.iter().enumerate() {
         // What only some drives record was left out of all of them.
-        let Some(own) = drive.as_ref().filter(|own| reference.matches(&own.recording)) else {
+        let Some(own) = drive.as_ref().filter(|own| other == number || reference.matches(&own.recording))
+        else {
             out.push(None);
             continue;
         };
-        progress(&format!("holding drive {} against {name}", number + 1));
+        if other == number {
+            out.push(Some(Vec::new()));
+            continue;
+        }
+        progress(&format!("holding drive {} against drive {}", other + 1, number + 1));
         let (_, differences) =
             reference.with_later(&own.recording, request.vehicle, &own.windows.training)?;
         out.push(Some(differences.likely()));

@@ -44,12 +44,7 @@ impl Earlier {
         if diagnosis.verdict == Verdict::NotIdentifiable {
             return Err(GapError::Earlier(diagnosis.reasons.join("; ")));
         }
-        Ok(Self::of(diagnosis, inferred, recording))
-    }
-
-    /// A drive that has its diagnosis.
-    pub(crate) fn of(diagnosis: Diagnosis, inferred: Inferred, recording: Recording) -> Self {
-        Self { diagnosis, inferred, recording }
+        Ok(Self { diagnosis, inferred, recording })
     }
 
     /// What it was explained with, in words.
