@@ -18,7 +18,7 @@ pub mod reference_pairs;
 mod tires;
 
 pub use batch::{Batch, BatchSettings, files};
-pub use draw::Pool;
+pub use draw::{Pool, names as effect_names};
 pub use error::WithheldError;
 pub use journal::Journal;
 pub use label::{
