@@ -181,7 +181,8 @@ fn controls(answers: &[Answer], dir: &Path) -> anyhow::Result<BTreeMap<String, C
     for (place, answer) in answers.iter().enumerate() {
         let folder = dir.join(&answer.label.case);
         let mut figures = vec![place as f64];
-        for name in [files::BAG, files::HELD_OUT] {
+        let is_compared = folder.join(files::EARLIER).exists();
+        for name in [files::BAG, if is_compared { files::EARLIER } else { files::HELD_OUT }] {
             let (path, topics) = (folder.join(name), TopicMap::default());
             let info = gripsight_bag::info(&path, &topics)?;
             let (measurements, _) = gripsight_bag::read_measurements(&path, &topics)?;

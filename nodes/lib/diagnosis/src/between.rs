@@ -103,7 +103,8 @@ fn apart(earlier: &Pulls, later: &Pulls) -> Option<(DMatrix<f64>, f64)> {
     (!columns.is_empty()).then(|| (DMatrix::from_columns(&columns) * wider, share))
 }
 
-/// How many times larger than they may be the squared differences are between a step of known covariance and what a problem says: the median over all directions, at least 1.
+/// How many times larger than they may be the squared differences are between a step of known covariance and what a problem says: the mean over all directions, at
+/// least 1.
 fn contradiction(problem: &Quadratic, step: &DVector<f64>, covariance: &DMatrix<f64>) -> f64 {
     let score = &problem.gradient + &problem.information * step;
     let known = &problem.information + &problem.information * covariance * &problem.information;

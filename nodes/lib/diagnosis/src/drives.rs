@@ -1,4 +1,4 @@
-//! Several drives of one car in one state: explained together, and each held against what they give together.
+//! Several drives of one car in one state: explained together, and each held against the drive that most agree with.
 
 use gripsight_estimation::{Estimate, Windows, by_block, interval};
 use gripsight_model::Recording;

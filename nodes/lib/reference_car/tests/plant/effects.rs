@@ -67,13 +67,15 @@ fn both(effect: &str) -> Vec<(SensorSample, SensorSample)> {
 }
 
 #[test]
-fn every_canonical_name_is_there_and_four_more() {
+fn every_canonical_name_is_there_and_six_more() {
     for name in CANONICAL {
         assert!(EFFECTS.iter().any(|e| e.name == name), "{name} is missing");
     }
-    for name in ["cross_wind", "tire_asymmetry", "steering_map", "gusts"] {
+    let more = ["cross_wind", "tire_asymmetry", "steering_map", "gusts", "camber_thrust", "drive_lag"];
+    for name in more {
         assert!(EFFECTS.iter().any(|e| e.name == name), "{name} is missing");
     }
+    assert_eq!(EFFECTS.len(), CANONICAL.len() + more.len());
 }
 
 #[test]
