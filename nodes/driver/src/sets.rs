@@ -28,13 +28,15 @@ pub(crate) fn read(message: &PacejkaParams, vehicle_hash: &str, provisional: boo
         PacejkaParams::WITHDRAWN => return Said::Withdrawn,
         _ => return Said::Nothing("neither accepted nor withdrawn"),
     };
-    let likely = message.front_peak.friction.value.min(message.rear_peak.friction.value);
+    let (front, rear) = (&message.front_peak, &message.rear_peak);
+    let weaker = if front.friction.value < rear.friction.value { front } else { rear };
     let signals = &message.signals;
     Said::Set(TireSet {
         tires: PacejkaParameters { front: formula(&message.front), rear: formula(&message.rear) },
         trust,
         valid_slip_rad: [message.front_valid_slip_rad, message.rear_valid_slip_rad],
-        likely_peak: Some(likely).filter(|peak| peak.is_finite()),
+        likely_peak: Some(weaker.friction.value).filter(|peak| peak.is_finite()),
+        peak_reached: weaker.reached,
         actuator: Actuator {
             delay_s: signals.steering_delay_s.max(0.0),
             gain: signals.steering_gain,

@@ -69,6 +69,8 @@ pub struct TireSet {
     pub valid_slip_rad: [f64; 2],
     /// Most likely peak over the load of the weaker axle, where somebody says; the set itself may promise less.
     pub likely_peak: Option<f64>,
+    /// Whether the data reach that peak.
+    pub peak_reached: bool,
     /// The steering actuator as identified with them.
     pub actuator: Actuator,
 }
@@ -83,6 +85,7 @@ impl TireSet {
             trust: Trust::Assumed,
             valid_slip_rad,
             likely_peak: None,
+            peak_reached: false,
             actuator: Actuator::default(),
         }
     }

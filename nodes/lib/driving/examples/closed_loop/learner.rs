@@ -137,6 +137,8 @@ fn told(found: &gripsight_identification::Longitudinal) -> Longitudinal {
 fn take(driver: &mut Driver, outcome: &Outcome, tires: &PacejkaParameters, trust: Trust, verbose: bool) {
     let slip = &outcome.valid_within.slip_rad;
     let signals = &outcome.signals;
+    let (front, rear) = (&outcome.peak_friction.front, &outcome.peak_friction.rear);
+    let weaker = if front.value < rear.value { front } else { rear };
     let set = TireSet {
         tires: *tires,
         trust,
@@ -145,7 +147,8 @@ fn take(driver: &mut Driver, outcome: &Outcome, tires: &PacejkaParameters, trust
         } else {
             [slip.front, slip.rear]
         },
-        likely_peak: Some(outcome.peak_friction.front.value.min(outcome.peak_friction.rear.value)),
+        likely_peak: Some(weaker.value),
+        peak_reached: weaker.reached,
         actuator: Actuator {
             delay_s: signals.steering_delay_s.max(0.0),
             gain: signals.steering_gain,

@@ -1,5 +1,6 @@
 //! Grip to plan with: what sets promise, what was driven, and what the road gave.
 
+use super::caught::{CAUGHT, Caught};
 use super::{Driver, Settings};
 use crate::Actuator;
 use crate::plan::Plan;
@@ -17,8 +18,6 @@ pub(super) const CAREFUL: f64 = 0.5;
 const ASSURED: f64 = 1.2;
 /// Share of the planned grip up to which the plan may grow: not in the middle of a corner.
 const GENTLE: f64 = 0.7;
-/// Share of what the road gave when the car slid, to go on with.
-pub(super) const CAUGHT: f64 = 0.96;
 /// Time in which a car settles after a model was given back.
 const SETTLES_S: f64 = 2.0;
 
@@ -33,6 +32,7 @@ impl Driver {
             return;
         }
         let assumed = self.is_assumed();
+        let explores = assumed || self.explores();
         let Some(look) = self.governor.look(state, acting, &self.vehicle, &self.plan.tires, assumed) else {
             return;
         };
@@ -45,8 +45,8 @@ impl Driver {
         } else if look.given.is_some() && state.stamp_s < self.trusted_until_s {
             // The end of what the model brought about.
         } else if let Some(given) = look.given {
-            self.catch(CAUGHT * given);
-        } else if assumed {
+            self.catch(CAUGHT * given, false);
+        } else if explores {
             self.turned = self.turned.max(look.turned);
             if look.turned < GENTLE * self.plan.grip && self.allowed() > 1.02 * self.plan.grip {
                 self.renew();
@@ -59,8 +59,15 @@ impl Driver {
         self.start.trust == Trust::Assumed && self.known.is_none() && self.prior.is_none()
     }
 
-    pub(super) fn catch(&mut self, grip: f64) {
-        self.caught = Some(self.caught.map_or(grip, |before| before.min(grip)).max(0.05));
+    /// Whether nobody has found the peak: a set that promises no more than was shown says nothing against what nobody measured.
+    fn explores(&self) -> bool {
+        self.trust() == Trust::AcceptedWithin && !self.known.is_some_and(|set| set.peak_reached)
+    }
+
+    /// The car slid (`warned`: or somebody says so), and the road gives so much.
+    pub(super) fn catch(&mut self, grip: f64, warned: bool) {
+        self.turned = self.turned.min(grip);
+        self.caught = Some(Caught::new(grip, self.plan.grip, warned).after(self.caught));
         self.renew();
     }
 
@@ -73,6 +80,9 @@ impl Driver {
         let careful = (ASSURED * self.turned).max(CAREFUL * share * shown).min(share * shown);
         let driven = self.driven.max(if base.trust == Trust::Assumed { careful } else { share * shown });
         let driven = driven.max(self.turned.min(share * self.start.grip()));
+        // As without a set, in the middle of the lap.
+        let assured =
+            if self.explores() { (ASSURED * self.turned).min(share * self.start.grip()) } else { 0.0 };
         let over = self.named.grip.map_or(1.0, |[front, rear]| front.min(rear));
         let likely_peak = base.likely_peak.map(|peak| over * peak);
         let likely = likely_peak.unwrap_or(f64::INFINITY);
@@ -82,7 +92,10 @@ impl Driver {
         let alone = match base.trust {
             Trust::Assumed => careful.max(self.driven).min(share * shown),
             Trust::Accepted => bold.min(share * likely_peak.unwrap_or(shown)).max(share * shown),
-            Trust::AcceptedWithin => bold.min((LIKELY * likely).max(self.driven)).max(share * shown),
+            Trust::AcceptedWithin => {
+                let peak = if base.peak_reached { share * likely } else { LIKELY * likely };
+                bold.min(peak.max(self.driven)).max(share * shown)
+            }
             Trust::Provisional => share * shown,
         };
         let grip = match &self.prior {
@@ -92,7 +105,8 @@ impl Driver {
             Some(prior) => (LIKELY * prior.grip().min(likely)).max(alone).min(prior_step * driven).min(most),
             None => alone,
         };
-        self.caught.map_or(grip, |caught| grip.min(caught))
+        let grip = grip.max(assured);
+        self.caught.map_or(grip, |caught| grip.min(caught.grip))
     }
 
     /// The set that steering rests on.

@@ -4,10 +4,11 @@
 //! | --- | --- |
 //! | nothing | half of the start's, and a step beyond what the car turned with, up to the start's |
 //! | accepted: the peak is known | a share of the most likely peak, step by step from what the set promises |
-//! | accepted within what was shown | a step beyond what was driven, so that the next drive shows more, up to the most likely peak; no less than was driven |
+//! | accepted within what was shown | a step beyond what was driven, so that the next drive shows more, up to the most likely peak; no less than was driven, nor than without a set |
 //! | a prior's peak (provisional) | up to that and to the peak that the data find most likely, in larger steps |
-//! | the car slid, or the identifier warns | what the road gave, until a set knows better |
+//! | the car slid, or the identifier warns | what the road gave, then half of the way back with each half lap, once a set has seen it or was not withdrawn |
 
+mod caught;
 mod grip;
 mod settings;
 mod speed;
@@ -16,7 +17,8 @@ use std::collections::VecDeque;
 
 use gripsight_vehicle::VehicleParameters;
 
-use self::grip::{CAREFUL, CAUGHT};
+use self::caught::{CAUGHT, Caught};
+use self::grip::CAREFUL;
 pub use self::settings::Settings;
 use crate::extended::Named;
 use crate::governor::Governor;
@@ -36,8 +38,6 @@ use crate::{Actuator, DrivingError, Longitudinal, Place, Track};
 const LATEST_S: f64 = 0.5;
 /// Oldest state that is made up for: beyond, the clocks differ.
 const OLDEST_S: f64 = 0.2;
-/// Growth of what the road gave with each part of a lap driven, as the slide may have been a puddle.
-const REGAINED: f64 = 1.01;
 /// Share of the grip to go on with after a warning that names no figure.
 const WARNED: f64 = 0.7;
 /// Time of the last lap, over that planned, that is remembered to try models on.
@@ -58,9 +58,9 @@ pub struct Driver {
     /// Largest grip that the car turned with while nothing was known.
     turned: f64,
     /// Grip that the road gave where it was less than planned.
-    caught: Option<f64>,
+    caught: Option<Caught>,
     /// The same before the last model was taken.
-    caught_before: Option<f64>,
+    caught_before: Option<Caught>,
     /// Until when a slide is no news: a model was given back.
     trusted_until_s: f64,
     /// As identified.
@@ -141,6 +141,7 @@ impl Driver {
                 if set.trust == Trust::Accepted {
                     self.caught = None;
                 }
+                self.caught.iter_mut().for_each(Caught::judge);
                 self.known = Some(set);
             }
         }
@@ -202,7 +203,7 @@ impl Driver {
     pub fn warn(&mut self, share: Option<f64>) {
         let promised = self.known.as_ref().unwrap_or(&self.start).grip();
         let left = share.filter(|s| (0.05..1.0).contains(s)).unwrap_or(WARNED);
-        self.catch(CAUGHT * left * promised);
+        self.catch(CAUGHT * left * promised, true);
     }
 
     /// Half laps driven: times to look whether there is something new to learn.
@@ -226,7 +227,7 @@ impl Driver {
     /// Whether the plan is held back by a slide or a warning.
     #[must_use]
     pub fn held_back(&self) -> bool {
-        self.caught.is_some_and(|caught| caught <= self.plan.grip + 1e-9)
+        self.caught.is_some_and(|caught| caught.grip <= self.plan.grip + 1e-9)
     }
 
     /// What the set in use rests on.
@@ -291,7 +292,8 @@ impl Driver {
         }
         if let Some(driven) = driven {
             self.driven = driven;
-            self.caught = self.caught.map(|caught| caught * REGAINED);
+            let promised = self.known.map_or(0.0, |set| self.settings.share * set.grip());
+            self.caught.iter_mut().for_each(|caught| caught.pass(promised));
             if self.caught.is_some() || self.is_assumed() {
                 self.renew();
             }

@@ -246,6 +246,12 @@ fn sets_are_taken_for_what_they_are_good_for() {
     within.take(TireSet { likely_peak: Some(0.3), ..set(0.25, Trust::AcceptedWithin) }).unwrap();
     approx::assert_relative_eq!(within.grip(), start, max_relative = 1e-2);
 
+    // A peak that was reached is known as well as an accepted one's.
+    within
+        .take(TireSet { likely_peak: Some(0.55), peak_reached: true, ..set(0.48, Trust::AcceptedWithin) })
+        .unwrap();
+    approx::assert_relative_eq!(within.grip(), settings.share * 0.55, max_relative = 1e-2);
+
     // A prior that promises more: a larger step and no more than that. One that promises less is no reason to slow down.
     for (prior, expected) in [(2.0, settings.prior_step * start), (0.3, settings.step * start)] {
         let mut driver = driver(TireSet::start());
@@ -254,6 +260,22 @@ fn sets_are_taken_for_what_they_are_good_for() {
         driver.take(set(prior, Trust::Provisional)).unwrap();
         approx::assert_relative_eq!(driver.grip(), expected, max_relative = 1e-2);
     }
+}
+
+#[test]
+fn a_set_that_promises_little_makes_nobody_slower_than_none() {
+    let mut driver = driver(TireSet::start());
+    drive(&mut driver, |_| 0.8, 0.0, 2.0);
+    let little = TireSet { likely_peak: Some(0.3), ..set(0.2, Trust::AcceptedWithin) };
+    driver.take(little).unwrap();
+    let before = driver.grip();
+    drive(&mut driver, |_| 0.8, 0.0, 20.0);
+    assert!(driver.grip() > 1.4 * before, "{before}, {}", driver.grip());
+    // The same where the little was reached.
+    driver.take(TireSet { peak_reached: true, ..little }).unwrap();
+    let known = driver.grip();
+    drive(&mut driver, |_| 0.8, 0.0, 3.0);
+    assert_eq!(driver.grip(), known);
 }
 
 #[test]
