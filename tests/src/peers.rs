@@ -15,7 +15,7 @@ use crate::domain::Domain;
 use crate::process::{Process, program_folder};
 
 /// Time that anything between two processes may take.
-pub const PATIENCE: Duration = Duration::from_secs(30);
+pub const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A peer, or why it is not there.
 type Found = Result<PathBuf, String>;

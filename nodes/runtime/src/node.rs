@@ -26,7 +26,7 @@ use crate::inputs::{self, Arrivals};
 use crate::logging;
 use crate::names::Identity;
 use crate::parameter_client::ParameterClient;
-use crate::parameter_services::{ParameterServices, serve_trigger};
+use crate::parameter_services::{ParameterServices, RepliesRead, serve_trigger};
 use crate::parameters::{Descriptor, Parameter, ParameterStore};
 use crate::publisher::{PATIENCE, Publisher, REPLAY_PATIENCE, RawCdr, RawPublisher};
 use crate::qos::Qos;
@@ -231,12 +231,12 @@ impl Node {
     /// [`Error::Name`], or [`Error::Create`] when DDS refuses.
     pub fn trigger(&mut self, name: &str, done: &'static str) -> Result<Trigger, Error> {
         let name = self.identity.resolve(name)?;
-        let participant = self.context.domain_participant();
+        let read = self.replies_read();
         let (sender, calls) = mpsc::channel(WAITING_CHANGES);
         for mapping in self.service_mappings.clone() {
             let serving = {
                 let mut ros = self.ros.lock().unwrap_or_else(PoisonError::into_inner);
-                serve_trigger(&mut ros, &name, mapping, &participant, done, sender.clone())?
+                serve_trigger(&mut ros, &name, mapping, &read, done, sender.clone())?
             };
             self.spawn(serving);
         }
@@ -337,15 +337,20 @@ impl Node {
         Ok(())
     }
 
+    fn replies_read(&self) -> RepliesRead {
+        let participant = self.context.domain_participant();
+        RepliesRead { participant, readers: self.readers.clone(), writers: self.service_mappings.len() }
+    }
+
     fn serve_parameters(&mut self, environment: &Environment) -> Result<(), Error> {
         let (changes, waiting) = mpsc::channel(WAITING_CHANGES);
         self.changes = Some(changes.clone());
         let services = ParameterServices { store: Arc::clone(&self.parameters), changes };
-        let participant = self.context.domain_participant();
+        let read = self.replies_read();
         for mapping in &environment.service_mappings {
             let serving = {
                 let mut ros = self.ros.lock().unwrap_or_else(PoisonError::into_inner);
-                services.clone().serve(&mut ros, &self.identity, *mapping, &participant)?
+                services.clone().serve(&mut ros, &self.identity, *mapping, &read)?
             };
             self.spawn(serving);
         }

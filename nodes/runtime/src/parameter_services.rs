@@ -11,7 +11,7 @@ use std::time::Duration;
 use futures::StreamExt;
 use gripsight_msgs::standard::rcl_interfaces as rcl;
 use ros2_client::{Message, Name, RmwRequestId, Server, ServiceMapping, ServiceTypeName};
-use rustdds::DomainParticipant;
+use rustdds::{DomainParticipant, GUID};
 use serde::{Deserialize, Serialize};
 use tokio::sync::mpsc;
 
@@ -19,10 +19,13 @@ use crate::Error;
 use crate::names::Identity;
 use crate::parameters::ParameterStore;
 use crate::qos::Qos;
+use crate::readers::Readers;
 use crate::value::ParameterValue;
 
-/// Time that a client's reader of replies has to be discovered.
-const DISCOVERY_TIME: Duration = Duration::from_secs(1);
+/// Time that a client's reader of replies has to be discovered, on a busy machine.
+const DISCOVERY_TIME: Duration = Duration::from_secs(10);
+/// Requests to one service whose clients' readers are waited for at once; those of clients that have gone hold nobody else up.
+const WAITING_CLIENTS: usize = 32;
 /// Bytes of a client's GUID that both mappings of services leave as they are; they tell participants apart.
 const KNOWN_OF_CLIENT: usize = 8;
 /// Vendor id of Eclipse CycloneDDS, as the OMG assigned it (<https://www.dds-foundation.org/dds-rtps-vendor-and-product-ids/>).
@@ -56,12 +59,12 @@ pub(crate) fn serve_trigger(
     node: &mut ros2_client::Node,
     name: &str,
     mapping: ServiceMapping,
-    participant: &DomainParticipant,
+    readers: &RepliesRead,
     done: &'static str,
     calls: mpsc::Sender<()>,
 ) -> Result<impl Future<Output = ()> + use<>, Error> {
     let server =
-        server::<TriggerRequest, TriggerResponse>(node, name, ("std_srvs", "Trigger"), mapping, participant)?;
+        server::<TriggerRequest, TriggerResponse>(node, name, ("std_srvs", "Trigger"), mapping, readers)?;
     Ok(answer(server, move |_: TriggerRequest| {
         let success = calls.try_send(()).is_ok();
         TriggerResponse { success, message: if success { done } else { "too many calls" }.to_owned() }
@@ -86,9 +89,9 @@ impl ParameterServices {
         node: &mut ros2_client::Node,
         identity: &Identity,
         mapping: ServiceMapping,
-        participant: &DomainParticipant,
+        readers: &RepliesRead,
     ) -> Result<impl Future<Output = ()> + use<>, Error> {
-        let mut factory = Factory { node, identity, mapping, participant };
+        let mut factory = Factory { node, identity, mapping, readers };
         let get = factory.server::<NamesRequest, GetResponse>("get_parameters", "GetParameters")?;
         let types =
             factory.server::<NamesRequest, TypesResponse>("get_parameter_types", "GetParameterTypes")?;
@@ -174,7 +177,7 @@ struct Factory<'a> {
     node: &'a mut ros2_client::Node,
     identity: &'a Identity,
     mapping: ServiceMapping,
-    participant: &'a DomainParticipant,
+    readers: &'a RepliesRead,
 }
 
 impl Factory<'_> {
@@ -184,7 +187,7 @@ impl Factory<'_> {
         A: Message + 'static,
     {
         let name = self.identity.resolve(&format!("~/{name}"))?;
-        server(self.node, &name, ("rcl_interfaces", type_name), self.mapping, self.participant)
+        server(self.node, &name, ("rcl_interfaces", type_name), self.mapping, self.readers)
     }
 }
 
@@ -194,7 +197,7 @@ fn server<Q, A>(
     name: &str,
     type_name: (&str, &str),
     mapping: ServiceMapping,
-    participant: &DomainParticipant,
+    readers: &RepliesRead,
 ) -> Result<Service<Q, A>, Error>
 where
     Q: Message + Clone + 'static,
@@ -206,7 +209,7 @@ where
     let server = node
         .create_server(mapping, &ros_name, &type_name, qos.clone(), qos)
         .map_err(|error| Error::create(format!("service {name}"), error))?;
-    let replies = Replies { participant: participant.clone(), topic: format!("rr{name}Reply") };
+    let replies = Replies { read: readers.clone(), topic: format!("rr{name}Reply") };
     Ok(Service { server, replies, mapping })
 }
 
@@ -230,28 +233,40 @@ pub(crate) fn mapping_of(guid: &[u8]) -> ServiceMapping {
     if guid.starts_with(&CYCLONE_DDS) { ServiceMapping::Cyclone } else { ServiceMapping::Enhanced }
 }
 
+/// Who reads the replies of a node's services.
+#[derive(Clone)]
+pub(crate) struct RepliesRead {
+    pub(crate) participant: DomainParticipant,
+    pub(crate) readers: Readers,
+    /// Writers of replies that each service has: one a mapping.
+    pub(crate) writers: usize,
+}
+
 /// The topic on which a service replies, by its DDS name.
 struct Replies {
-    participant: DomainParticipant,
+    read: RepliesRead,
     topic: String,
 }
 
 impl Replies {
-    /// Waits until the participant of `client` reads the replies. A request may arrive before its
+    /// Waits until the writers of replies are connected to the reader of `client`. A request may arrive before its
     /// client's reader is discovered; a reply sent then is lost, and the client waits forever.
     async fn are_read_by(&self, client: &RmwRequestId) {
-        let (client, _) = client.writer_gid.as_bytes().split_at(KNOWN_OF_CLIENT);
-        let is_read = || {
-            self.participant.discovered_readers().iter().any(|reader| {
-                *reader.subscription_topic_data.topic_name() == self.topic
-                    && reader.reader_proxy.remote_reader_guid.to_bytes().starts_with(client)
-            })
-        };
         let end = tokio::time::Instant::now() + DISCOVERY_TIME;
-        while !is_read() && tokio::time::Instant::now() < end {
-            // Longer than the writer takes from the reader's discovery to sending to it.
-            tokio::time::sleep(Duration::from_millis(20)).await;
+        let connected = |reader| self.read.readers.writers_of(reader) >= self.read.writers;
+        while !self.reader_of(client).is_some_and(connected) && tokio::time::Instant::now() < end {
+            tokio::time::sleep(Duration::from_millis(5)).await;
         }
+    }
+
+    /// The reader by which the participant of `client` reads the replies, once it is discovered.
+    fn reader_of(&self, client: &RmwRequestId) -> Option<GUID> {
+        let (client, _) = client.writer_gid.as_bytes().split_at(KNOWN_OF_CLIENT);
+        self.read.participant.discovered_readers().iter().find_map(|reader| {
+            let guid = reader.reader_proxy.remote_reader_guid;
+            let of_service = *reader.subscription_topic_data.topic_name() == self.topic;
+            (of_service && guid.to_bytes().starts_with(client)).then_some(guid)
+        })
     }
 }
 
@@ -261,21 +276,28 @@ where
     A: Message + 'static,
 {
     let Service { server, replies, mapping } = service;
-    let mut requests = server.receive_request_stream();
-    while let Some(request) = requests.next().await {
-        match request {
-            Ok((id, _)) if !asks_by(mapping, &id) => {}
-            Ok((id, request)) => {
-                let response = respond(request);
-                replies.are_read_by(&id).await;
-                if let Err(error) = server.async_send_response(id, response).await {
-                    tracing::warn!("cannot answer a request: {error}");
-                }
-            }
+    let requests = server.receive_request_stream();
+    let answered = requests.for_each_concurrent(WAITING_CLIENTS, |request| {
+        // What is asked is done in the order of the requests; a reply may overtake another client's.
+        let reply = match request {
+            Ok((id, _)) if !asks_by(mapping, &id) => None,
+            Ok((id, request)) => Some((id, respond(request))),
             // As a rule one that was made by the other mapping.
-            Err(error) => tracing::debug!("cannot read a request: {error}"),
+            Err(error) => {
+                tracing::debug!("cannot read a request: {error}");
+                None
+            }
+        };
+        let (server, replies) = (&server, &replies);
+        async move {
+            let Some((id, response)) = reply else { return };
+            replies.are_read_by(&id).await;
+            if let Err(error) = server.async_send_response(id, response).await {
+                tracing::warn!("cannot answer a request: {error}");
+            }
         }
-    }
+    });
+    answered.await;
 }
 
 #[cfg(test)]

@@ -21,6 +21,11 @@ impl Readers {
         self.known().get(&writer).map_or(0, BTreeSet::len)
     }
 
+    /// How many writers of this process are connected to `reader` now.
+    pub(crate) fn writers_of(&self, reader: GUID) -> usize {
+        self.known().values().filter(|readers| readers.contains(&reader)).count()
+    }
+
     /// Keeps the readers as `participant` tells of them, for as long as it is polled.
     pub(crate) async fn follow(self, participant: DomainParticipant) {
         let told = participant.status_listener();
@@ -61,6 +66,7 @@ mod tests {
             readers.matched(writer, reader);
         }
         assert_eq!((readers.of(first), readers.of(second), readers.of(reader)), (1, 1, 0));
+        assert_eq!((readers.writers_of(reader), readers.writers_of(first)), (2, 0));
         readers.lost(reader);
         assert_eq!((readers.of(first), readers.of(second)), (0, 0));
     }

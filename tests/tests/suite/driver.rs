@@ -13,7 +13,7 @@ use serde_json::json;
 
 const SET: &str = "gripsight_msgs/msg/PacejkaParams";
 /// Two laps at the start's speed, on a busy machine.
-const LAPS: Duration = Duration::from_secs(60);
+const LAPS: Duration = Duration::from_secs(120);
 
 /// Publishes a set as the identifier would.
 fn publish(domain: &Domain, python: &Path, hash: &str, status: u8) {

@@ -16,7 +16,7 @@ use gripsight_tests::process::{Process, node, program};
 use serde_json::{Value, json};
 
 /// A run on one busy core.
-const RUN: Duration = Duration::from_secs(90);
+const RUN: Duration = Duration::from_secs(180);
 const PRIOR: (f64, f64) = (0.9, 0.2);
 
 /// A drive of the reference car: bag and vehicle file.
