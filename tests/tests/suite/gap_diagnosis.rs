@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use gripsight_msgs::{GapReport, Message};
+use gripsight_msgs::{GapReport, Message, StateSequence, TirePosterior};
 use gripsight_tests::domain::Domain;
 use gripsight_tests::peers::{available, cyclone, start_cyclone};
 use gripsight_tests::process::node;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::identification::simulate;
 
@@ -32,32 +32,44 @@ fn a_moving_window_of_a_replayed_drive_is_diagnosed_within_bounds() {
     let vehicle = ["--params-file", vehicle.to_str().unwrap()];
     let timeout = RUN.as_secs().to_string();
     let listen = ["--qos", "reliable", "--count", "2", "--timeout", &timeout];
-    let reports = start_cyclone(
-        &domain,
-        &python,
-        &[&["subscribe", "/gap_diagnosis/report", GapReport::TYPE], &listen[..]].concat(),
-    );
+    let listen = |topic: &str, kind: &str| {
+        start_cyclone(&domain, &python, &[&["subscribe", topic, kind][..], &listen].concat())
+    };
+    let reports = listen("/gap_diagnosis/report", GapReport::TYPE);
+    let sequences = listen("/telemetry/sequence", StateSequence::TYPE);
+    let posterior = listen("/identifier/posterior", TirePosterior::TYPE);
     let joined = ["-r", "sequence:=telemetry/sequence", "-r", "posterior:=identifier/posterior"];
     let diagnosis = node(&domain, "gap_diagnosis", &[&joined[..], &vehicle[..]].concat());
     let joined = ["-r", "sequence:=telemetry/sequence", "-r", "model:=s4_residual/model"];
     let _identifier = node(&domain, "identifier", &[&joined[..], &vehicle[..]].concat());
     let joined = ["-r", "sequence:=telemetry/sequence", "-r", "candidate:=identifier/candidate"];
     let _residual = node(&domain, "s4_residual", &[&joined[..], &vehicle[..]].concat());
-    // The second window begins after the first: what the identifier learned of the car's own tires there is a prior for it,
-    // and a slow machine has time to learn it.
+    // The second window begins after the first: what the identifier learned of the car's own tires there is a prior for it.
     let window = ["-p", "window_s:=20.0", "-p", "hop_s:=23.0", "-p", "reliable_inputs:=true"];
     let topics = ["-r", "odom:=/car_state/odom", "-r", "imu:=/imu/data", "-r", "wheels:=/wheel_speeds"];
     let _telemetry = node(&domain, "telemetry", &[&window[..], &topics[..], &vehicle[..]].concat());
     let path = format!("bag:={}", bag.display());
     let wait = "wait_for:=[/car_state/odom, /drive, /imu/data, /wheel_speeds]";
-    let _player = node(&domain, "bag_player", &["-p", &path, "-p", "rate:=1.0", "-p", wait]);
+    let _player = node(&domain, "bag_player", &["-p", &path, "-p", "rate:=2.0", "-p", wait]);
+    // The bag stands until both have said what they make of the first window, however slow the machine is.
+    let pause = |paused: bool| {
+        let value = json!({"type": 1, "bool_value": paused});
+        let request = json!({"parameters": [{"name": "paused", "value": value}]}).to_string();
+        let service = ["call", "/bag_player/set_parameters", "rcl_interfaces/srv/SetParameters", &request];
+        start_cyclone(&domain, &python, &service).line(RUN)
+    };
+    sequences.line(RUN);
+    pause(true);
 
     // Python writes NaN ("not stated") and Infinity (no limit), which are no JSON.
     let report = || {
         let line = reports.line(RUN).replace("NaN", "null").replace("Infinity", "null");
         serde_json::from_str::<Value>(&line.replace("-null", "null")).unwrap()
     };
-    let (first, second) = (report(), report());
+    let first = report();
+    posterior.line(RUN);
+    pause(false);
+    let second = report();
     let id = |report: &Value| report["handshake"]["sequence_id"].as_u64().unwrap();
     assert!(id(&first) < id(&second));
     // A loss of grip shows only against tires that are known.
