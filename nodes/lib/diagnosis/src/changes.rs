@@ -19,7 +19,6 @@ use crate::engine::Engine;
 
 use crate::answer::Change;
 use crate::between::Between;
-use crate::infer::FIRST;
 use crate::inferred::Inferred;
 use crate::outcome::EffectParameter;
 use crate::trust::TireTrust;
@@ -33,7 +32,7 @@ const OTHER_TIRES: f64 = 10.0;
 /// Share of a dispersion above which it is the same.
 const SETTLED: f64 = 0.95;
 /// Half width of a 90 % interval in standard deviations.
-const NINETY: f64 = 1.645;
+pub(crate) const NINETY: f64 = 1.645;
 
 /// The differences of two drives.
 #[derive(Debug, Clone)]
@@ -41,7 +40,6 @@ pub(crate) struct Compared {
     selection: Selection,
     /// How many times larger than they may be the contradictions are that no change explains.
     pub(crate) dispersion: f64,
-    columns: usize,
     terms: usize,
 }
 
@@ -96,7 +94,7 @@ pub(crate) fn compare(engine: &Engine<'_>, earlier: &Inferred, later: &Inferred)
             selection.best.iter().zip(&terms).map(|(a, t)| (*a).min(t.log_weights.len() - 1)).collect();
         selection = select(&problem, dispersion, &terms, &start, 23)?;
     }
-    Some(Compared { selection, dispersion, columns: n, terms: earlier.terms.len() })
+    Some(Compared { selection, dispersion, terms: earlier.terms.len() })
 }
 
 /// The free terms of a site's difference that close too little of the later drive's error, those that close least first.
@@ -219,24 +217,6 @@ impl Compared {
         self.selection.probability_that(|c| c[self.terms..][terms.clone()].iter().any(|&a| a > 0))
     }
 
-    /// The later drive's most probable model: its values within what is believed of each effect, and the terms that it has.
-    pub(crate) fn later(&self, engine: &Engine<'_>, earlier: &Inferred) -> (Vec<f64>, Vec<usize>) {
-        let n = self.columns;
-        let step = &self.selection.best_step;
-        let mut values: Vec<f64> = (0..n).map(|i| earlier.values[i] + step[i] + step[n + i]).collect();
-        for effect in &earlier.columns.effects {
-            let columns = earlier.columns.of_effect(*effect).unwrap_or(0..0);
-            for (column, spec) in columns.zip(effect.spec().parameters) {
-                let [low, high] = spec.range.map(|r| spec.null + r * engine.size(spec));
-                values[column] = values[column].clamp(low, high);
-            }
-        }
-        let best = &self.selection.best;
-        // Tires and hold have no alternatives of their own.
-        let has = |t: usize| t >= FIRST && (best[t] > 0 || best[self.terms + t] > 0);
-        (values, (0..self.terms).map(|t| usize::from(has(t))).collect())
-    }
-
     /// Parameters of an effect in the earlier drive: as fitted to it where its model has the effect, else what both drives together make of them.
     pub(crate) fn earlier(&self, earlier: &Inferred, effect: EffectId) -> Option<Vec<f64>> {
         let range = earlier.columns.of_effect(effect)?;
@@ -287,7 +267,6 @@ impl Compared {
         }
         out.retain(|c| c.probability >= decisions::LISTED);
         out.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-        debug_assert!(self.selection.best_step.len() > 2 * self.columns);
         out
     }
 }

@@ -146,7 +146,7 @@ pub(crate) fn explain(
         }
         Some(earlier) => {
             progress("comparing the drives");
-            let (later, differences) = earlier.with_later(&recording, request.vehicle, &windows.training)?;
+            let (later, differences) = earlier.with_later(&recording, request.vehicle, &windows, progress)?;
             engine.sigma.clone_from(&later.sigma);
             (later, Some((earlier, differences)))
         }

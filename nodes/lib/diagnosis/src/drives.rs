@@ -175,7 +175,7 @@ fn held_against(
         }
         progress(&format!("holding drive {} against drive {}", other + 1, number + 1));
         let (_, differences) =
-            reference.with_later(&own.recording, request.vehicle, &own.windows.training)?;
+            reference.with_later(&own.recording, request.vehicle, &own.windows, progress)?;
         out.push(Some(differences.likely()));
     }
     Ok(out)

@@ -1,26 +1,24 @@
 //! A drive from before: what a later one of the same car is compared with.
 
-use gripsight_estimation::Windows;
-use gripsight_model::{EffectId, Recording};
+use gripsight_estimation::Split;
+use gripsight_estimation::selection::Term;
+use gripsight_model::{EffectId, Flexible, Recording, Site};
+use gripsight_signals::DataHealth;
+use gripsight_vehicle::VehicleParameters;
 
 use crate::answer::Change;
-use crate::budget::Budget;
-use crate::changes::{Compared, compare};
+use crate::budget::{Budget, Scorer, large_slip_rad};
+use crate::changes::{Compared, NINETY, compare};
 use crate::decisions;
-use crate::diagnose::{SEARCH_WINDOWS, explain};
+use crate::diagnose::{SEARCH_WINDOWS, explain, fitted_null};
 use crate::engine::Engine;
-use crate::infer::linearised;
+use crate::infer::{infer, linearised};
 use crate::inferred::Inferred;
 use crate::outcome::{Diagnosis, RankedEffect};
 use crate::sizes::{Sized, reported};
 use crate::trust::TireTrust;
 use crate::usable::usable;
 use crate::{GapError, Request, Verdict};
-use gripsight_signals::DataHealth;
-use gripsight_vehicle::VehicleParameters;
-
-/// How often another drive is linearised anew to be compared.
-const COMPARISONS: usize = 2;
 
 /// A drive from before with its own diagnosis. A later drive is compared with all that was found in it: tires, effects, and what they left.
 #[derive(Debug, Clone)]
@@ -67,34 +65,61 @@ impl Earlier {
         &self,
         recording: &Recording,
         vehicle: &VehicleParameters,
-        training: &Windows,
+        windows: &Split,
+        progress: &mut dyn FnMut(&str),
     ) -> Result<(Inferred, Differences), GapError> {
-        let windows = training.thinned(SEARCH_WINDOWS);
+        let own = self.explained(recording, vehicle, windows, progress);
+        let windows = windows.training.thinned(SEARCH_WINDOWS);
         let like = &self.inferred;
-        let mut alike = Engine::new(recording, vehicle, like.tires, TireTrust::file());
-        let (mut values, mut chosen) = (like.values.clone(), like.chosen.clone());
-        let mut best: Option<(Inferred, Differences)> = None;
-        // First where the earlier drive was linearised: fits may end apart although nothing has changed. Where something has, around the
-        // later drive's own fits: from the earlier model on, then from what that comparison makes of it. Where the drives contradict each other
-        // the least they are compared at their best.
-        for comparison in 0..=COMPARISONS {
-            let at = (&values[..], &chosen[..]);
-            let later =
-                linearised(&mut alike, like, at, comparison > 0, &windows).ok_or(GapError::NotFinite)?;
-            let differences = self.compared(&alike, &later).ok_or(GapError::NotFinite)?;
-            let same = differences.verdict() == Verdict::NoGap;
-            if comparison > 0 {
-                (values, chosen) = differences.later(&alike, self);
-            }
-            let left = differences.compared.dispersion;
-            if best.as_ref().is_none_or(|(_, b)| left <= b.compared.dispersion) {
-                best = Some((later, differences));
-            }
-            if same && comparison > 0 {
-                break;
-            }
-        }
-        best.ok_or(GapError::NotFinite)
+        let mut engine = Engine::new(recording, vehicle, like.tires, TireTrust::file());
+        let mut at = |place: (&[f64], &[usize]), fitted: bool| {
+            let later = linearised(&mut engine, like, place, fitted, &windows)?;
+            let differences = self.compared(&engine, &later)?;
+            Some((later, differences))
+        };
+        // Where the earlier drive was linearised, and where its model is fitted to the later one: fits may end apart although nothing has changed. Where the
+        // drives contradict each other the least they are compared at their best. A place that the model runs away from tells nothing.
+        let earlier = (&like.values[..], &like.chosen[..]);
+        let [here, refitted] = [at(earlier, false), at(earlier, true)];
+        let contradiction = |place: &(Inferred, Differences)| place.1.compared.dispersion;
+        let alike = [here, refitted]
+            .into_iter()
+            .flatten()
+            .min_by(|a, b| contradiction(a).total_cmp(&contradiction(b)));
+        // But where the later drive needs terms that the earlier one's model lacks, by more than the drives contradict each other anyway, it is far from anything that
+        // tells what has changed, and is linearised around a model of its own: if the drives then contradict each other no more than by chance.
+        let own = own.map(|own| like.model_of(&own)).and_then(|(values, chosen)| {
+            let own = at((&values, &chosen), true)?;
+            let needs = alike.as_ref().is_none_or(|alike| {
+                let gained = (alike.0.weighed.cost - own.0.weighed.cost) / own.0.dispersion;
+                let by_chance = 1.0 + NINETY * (2.0 / values.len() as f64).sqrt();
+                gained > contradiction(alike) * price(&own.0.terms, &like.chosen, &chosen)
+                    && contradiction(&own) < contradiction(alike) * by_chance
+            });
+            needs.then_some(own)
+        });
+        own.or(alike).ok_or(GapError::NotFinite)
+    }
+
+    /// What the inference makes of another drive by itself, from this one's model on.
+    fn explained(
+        &self,
+        recording: &Recording,
+        vehicle: &VehicleParameters,
+        windows: &Split,
+        progress: &mut dyn FnMut(&str),
+    ) -> Option<Inferred> {
+        let model = &self.diagnosis.extended_model;
+        let mut engine = Engine::new(recording, vehicle, model.tires, TireTrust::drive());
+        (engine.held, engine.usual) = model.parameters().ok()?;
+        let search = windows.training.thinned(SEARCH_WINDOWS);
+        let null = fitted_null(&engine, &search).ok()?;
+        let slip_rad = large_slip_rad(&engine, &search);
+        let flexible = Flexible::new(recording, slip_rad, vehicle.wheelbase_m(), &Site::ALL);
+        let scorer = Scorer::new(&engine.clone(), None, windows);
+        let effects = self.inferred.columns.effects.iter().copied();
+        let library: Vec<EffectId> = effects.filter(|e| self.inferred.is_open(*e)).collect();
+        infer(&mut engine, &null, &library, flexible, &search, &scorer, progress)
     }
 
     /// What differs in a later drive that was linearised in the same columns.
@@ -114,6 +139,16 @@ impl Earlier {
     }
 }
 
+/// The drop of a cost by which terms that only one of two models has are worth it (twice the log odds against them).
+fn price(terms: &[Term], without: &[usize], with: &[usize]) -> f64 {
+    let odds = |t: &Term| t.log_weights.first().zip(t.log_weights.last()).map_or(0.0, |(no, yes)| no - yes);
+    let added = terms
+        .iter()
+        .zip(without.iter().zip(with))
+        .filter(|(_, (without, with))| **without == 0 && **with > 0);
+    added.map(|(t, _)| 2.0 * odds(t)).sum()
+}
+
 /// What differs between two drives.
 #[derive(Debug, Clone)]
 pub(crate) struct Differences {
@@ -128,11 +163,6 @@ impl Differences {
     pub(crate) fn likely(self) -> Vec<Change> {
         let effect = |c: &Change| EffectId::by_name(c.name).is_none_or(|e| self.accepted.contains(&e));
         self.changes.iter().filter(|c| c.probability >= decisions::LIKELY && effect(c)).cloned().collect()
-    }
-
-    /// The later drive's most probable model: its values, and the terms that it has.
-    pub(crate) fn later(&self, engine: &Engine<'_>, earlier: &Earlier) -> (Vec<f64>, Vec<usize>) {
-        self.compared.later(engine, &earlier.inferred)
     }
 
     /// An effect's parameters in the later drive, with standard deviations of what the earlier drive has and of the differences together.
@@ -189,5 +219,22 @@ impl Differences {
         } else {
             Verdict::NoGap
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gripsight_estimation::selection::ColumnPrior;
+
+    use super::*;
+
+    #[test]
+    fn a_term_costs_its_odds_and_what_both_models_have_nothing() {
+        let prior = || ColumnPrior { offset: 0.0, sigma: vec![0.1, 1.0], bounds: [-9.0, 9.0] };
+        let offered =
+            |from| Term { from, priors: vec![prior()], log_weights: vec![0.9_f64.ln(), 0.1_f64.ln()] };
+        let terms = [Term { from: 0, priors: vec![prior()], log_weights: vec![0.0] }, offered(1), offered(2)];
+        approx::assert_relative_eq!(price(&terms, &[0, 0, 1], &[1, 1, 1]), 2.0 * 9.0_f64.ln());
+        approx::assert_relative_eq!(price(&terms, &[0, 1, 1], &[0, 0, 1]), 0.0);
     }
 }

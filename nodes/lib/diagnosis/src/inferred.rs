@@ -1,7 +1,9 @@
 //! What the inference comes to, and what may be asked of it.
 
+use std::ops::Range;
+
 use gripsight_estimation::selection::{Selection, Term};
-use gripsight_model::{EffectId, Site};
+use gripsight_model::{BASE, EffectId, Site};
 use gripsight_vehicle::OwnTires;
 
 use crate::columns::Columns;
@@ -44,7 +46,7 @@ impl Inferred {
     }
 
     /// Places of a site's flexible terms among the terms.
-    pub(crate) fn terms_of_site(&self, site: Site) -> std::ops::Range<usize> {
+    pub(crate) fn terms_of_site(&self, site: Site) -> Range<usize> {
         let range = self.columns.of_site(site);
         self.columns.term_of_flexible(range.start)..self.columns.term_of_flexible(range.end)
     }
@@ -88,6 +90,28 @@ impl Inferred {
         }
         let by_fit = self.term_of(effect).filter(|_| self.is_open(effect)).map_or(0.0, |t| self.confirmed[t]);
         if self.stated.is_some() { by_fit.min(decisions::NEEDLESS) } else { by_fit }
+    }
+
+    /// The model of another drive in these columns: its values, and the terms that it has. It was inferred from this one's model on: what this one has it has.
+    pub(crate) fn model_of(&self, other: &Self) -> (Vec<f64>, Vec<usize>) {
+        let (mut values, mut chosen) = (self.values.clone(), self.chosen.clone());
+        values[..BASE].copy_from_slice(&other.values[..BASE]);
+        let mut take = |(column, term): (Range<usize>, usize), from: (Range<usize>, usize)| {
+            values[column].copy_from_slice(&other.values[from.0]);
+            chosen[term] = chosen[term].max(usize::from(other.chosen[from.1] > 0));
+        };
+        for &effect in &self.columns.effects {
+            let place = |of: &Self| Some((of.columns.of_effect(effect)?, of.term_of(effect)?));
+            if let (Some(here), Some(there)) = (place(self), place(other)) {
+                take(here, there);
+            }
+        }
+        let flexible = |of: &Self| of.columns.first_flexible()..of.columns.len();
+        for (here, there) in flexible(self).zip(flexible(other)) {
+            let place = |of: &Self, column: usize| (column..column + 1, of.columns.term_of_flexible(column));
+            take(place(self, here), place(other, there));
+        }
+        (values, chosen)
     }
 
     /// What is stated of an effect, if it is in the model.
