@@ -31,6 +31,7 @@ INCLUDED = [
     COMMON + "tum_helpers_cpp", COMMON + "tum_types_cpp",
 ]
 SOURCES = ["aerodynamics_models", "drivetrain_fx", "drivetrain_rwd_lsd", "helpers", "steering_actuator_pt1", "tire_models"]
+TIRES = ["MF_Simple", "MF52", "Linear"]
 # Names of what is fitted, by their ends in the parameter file; both wheels of an axle have the same tire.
 FITTED = {
     "mass_vehicle_kg": ("kg", "loads_and_body"), "moment_of_inertia_kgpm2.z": ("kg m2", "loads_and_body"),
@@ -44,6 +45,11 @@ def built(checkout, tire, eigen):
     """The shared library of a checkout and a tire model."""
     if not (checkout / "lib/ocd_vehicle_model_cpp").is_dir():
         sys.exit(f"no Open-Car-Dynamics in {checkout}: options: {{checkout: PATH}} names a clone with its submodules")
+    for part in INCLUDED:
+        if not (checkout / part).is_dir():
+            sys.exit(f"{checkout} lacks {part}: `git submodule update --init --recursive` in it brings its submodules")
+    if tire not in TIRES:
+        sys.exit(f"tire={tire}: {', '.join(TIRES)} are possible")
     sources = [HERE / "open_car_dynamics.cpp"]
     for name in SOURCES:
         sources += sorted((checkout / f"lib/ocd_{name}_cpp/src").glob("*.cpp"))
