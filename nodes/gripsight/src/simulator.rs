@@ -20,6 +20,8 @@ use crate::notes::read_notes;
 use crate::{Outcome, outputs};
 
 const PATCH_FILE: &str = "simulator.patch";
+/// What the names of the simulator's own parameters begin with.
+const OWN: &str = "simulator.";
 
 /// gap.json: the diagnosis, the patch's verification, and what both rest on.
 #[derive(Serialize)]
@@ -136,14 +138,17 @@ pub(crate) fn pair(simulator_file: &Path, bag: &Path, other: &Path) -> anyhow::R
     let (said, patched) = patched(&file, &simulator, &question, &result)?;
     let question = Question { sequence: &other, commands: Commands::of(&other), ..question };
     let before = error_over(&simulator, &question, &[], Span::Whole, &[])?.over_noise;
-    let named: Vec<(String, f64)> = result
-        .fitted
-        .iter()
-        .filter(|(name, _)| result.effects.iter().any(|e| e.accepted && e.name == *name))
-        .cloned()
-        .collect();
+    // What is in no file is changed by hand, as the answer says.
+    let in_file = |name: &str| {
+        let own = name.strip_prefix(OWN);
+        let parameters = &simulator.description().parameters;
+        own.is_some_and(|own| parameters.iter().any(|p| p.name == own && !p.keys.is_empty()))
+    };
+    let is_named = |name: &str| result.effects.iter().any(|e| e.accepted && e.name == *name);
+    let named: Vec<(String, f64)> =
+        result.fitted.iter().filter(|(name, _)| is_named(name) && !in_file(name)).cloned().collect();
     let after = match patched {
-        _ if named.is_empty() => before,
+        None if named.is_empty() => before,
         Some(patched) => error_over(&patched, &question, &named, Span::Whole, &[])?.over_noise,
         None => error_over(&simulator, &question, &named, Span::Whole, &[])?.over_noise,
     };
@@ -177,7 +182,9 @@ fn patched(
     fs::write(copy.path().join(name), &found.text).context("cannot write the patched parameters")?;
     let patched = Simulator::start_with(file, Some(&copy.path().join(name)))
         .context("cannot start the simulator with the patched parameters")?;
-    let error = error_over(&patched, question, &result.fitted, Span::HeldOut, &result.residuals)?;
+    let around: Vec<(String, f64)> =
+        result.fitted.iter().filter(|(name, _)| !name.starts_with(OWN)).cloned().collect();
+    let error = error_over(&patched, question, &around, Span::HeldOut, &result.residuals)?;
     said.verified = Some(error.over_noise);
     said.is_no_better = !error.is_clearly_less;
     if said.is_no_better {

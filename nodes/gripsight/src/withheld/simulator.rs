@@ -50,7 +50,7 @@ impl ReferenceSimulator {
                 low: f.low * value,
                 high: f.high * value,
                 unit: f.unit.to_owned(),
-                key: Some(f.name.to_owned()),
+                keys: vec![f.name.to_owned()],
                 in_code: None,
                 integer: false,
                 site: Some(f.site.to_owned()),

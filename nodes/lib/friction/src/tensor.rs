@@ -3,8 +3,9 @@
 //! The resize is fast_image_resize's convolution with a bilinear kernel, which equals the antialiased resize of torchvision
 //! and PIL within one level of 255; training uses those. The crop comes before the resize.
 
-use fast_image_resize::images::{Image, ImageRef};
-use fast_image_resize::{FilterType, PixelType, ResizeAlg, ResizeOptions, Resizer};
+use fast_image_resize::images::{TypedImage, TypedImageRef};
+use fast_image_resize::pixels::U8x3;
+use fast_image_resize::{FilterType, ResizeAlg, ResizeOptions, Resizer};
 
 use crate::error::FrictionError;
 use crate::picture::RgbPicture;
@@ -37,11 +38,14 @@ impl Preprocessor {
     /// [`FrictionError::Resize`] where the picture's size does not match its data.
     pub fn resize(&mut self, picture: &RgbPicture) -> Result<RgbPicture, FrictionError> {
         let failed = |message: String| FrictionError::Resize { message };
-        let source = ImageRef::new(picture.width, picture.height, &picture.data, PixelType::U8x3)
+        // Typed: code for one kind of pixel is compiled, not for all that there are (minutes of it).
+        let source = TypedImageRef::<U8x3>::from_buffer(picture.width, picture.height, &picture.data)
             .map_err(|e| failed(e.to_string()))?;
-        let mut target = Image::new(INPUT_SIDE, INPUT_SIDE, PixelType::U8x3);
-        self.resizer.resize(&source, &mut target, &self.options).map_err(|e| failed(e.to_string()))?;
-        Ok(RgbPicture { width: INPUT_SIDE, height: INPUT_SIDE, data: target.into_vec() })
+        let mut data = vec![0; (INPUT_SIDE * INPUT_SIDE * 3) as usize];
+        let mut target = TypedImage::<U8x3>::from_buffer(INPUT_SIDE, INPUT_SIDE, &mut data)
+            .map_err(|e| failed(e.to_string()))?;
+        self.resizer.resize_typed(&source, &mut target, &self.options).map_err(|e| failed(e.to_string()))?;
+        Ok(RgbPicture { width: INPUT_SIDE, height: INPUT_SIDE, data })
     }
 }
 

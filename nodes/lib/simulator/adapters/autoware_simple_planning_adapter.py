@@ -12,7 +12,7 @@ import math
 import sys
 from collections import deque
 
-from gripsight_simulator import Simulator, keys_of, read_values, serve
+from gripsight_simulator import Simulator, keys_of, read_options, read_values, serve
 
 BOUNDS = {
     "steer_time_delay": (0.24, 0.0, 0.6, "s"), "steer_time_constant": (0.27, 0.0, 1.0, "s"), "steer_dead_band": (0.0, 0.0, 0.05, "rad"),
@@ -82,7 +82,7 @@ class SimplePlanning(Simulator):
 
 
 def main():
-    options = dict(a.split("=", 1) for a in sys.argv[2:])
+    options = read_options("model", "wheel_base", "step_s")
     values = read_values(sys.argv[1] if len(sys.argv) > 1 else "")
     model = options.get("model", "delay_steer_acc_geared")
     if model not in ("delay_steer_acc_geared", "ideal_steer_acc"):

@@ -7,12 +7,13 @@
 Reference point: the centre of gravity. Inputs: the rate of the road wheels' angle, made of the recorded angle, and an acceleration.
 """
 
+import copy
 import math
 import sys
 
 from vehiclemodels.vehicle_parameters import setup_vehicle_parameters
 
-from gripsight_simulator import Simulator, read_values, serve
+from gripsight_simulator import Simulator, read_options, read_values, serve
 
 COMMON = {
     "m": (0.6, 1.6, "kg", "loads_and_body"), "I_z": (0.4, 2.5, "kg m2", "loads_and_body"), "a": (0.7, 1.4, "m", "loads_and_body"),
@@ -40,7 +41,7 @@ class CommonRoad(Simulator):
     outputs = ["v_x_mps", "v_y_mps", "yaw_rate_radps", "steering_rad"]
 
     def __init__(self, model, vehicle, values, step_s):
-        self.name, self.model, self.vehicle, self.values, self.step_s = f"commonroad {model}", model, vehicle, values, step_s
+        self.name, self.model, self.step_s = f"commonroad {model}", model, step_s
         p = setup_vehicle_parameters(vehicle_id=vehicle)
         self.parameters = []
         for name, (low, high, unit, site) in {**COMMON, **MORE[model]}.items():
@@ -62,12 +63,14 @@ class CommonRoad(Simulator):
             from vehiclemodels.vehicle_dynamics_mb import vehicle_dynamics_mb as rates
             self.lacks, self.init = ["tire relaxation"], init_mb
         self.rates = rates
+        # Reading the package's files takes as long as a rollout.
+        self.given = plain(setup_vehicle_parameters(vehicle_id=vehicle), values)
 
     def place(self, parameters, motion, fresh):
         v_x, v_y, yaw_rate, steering = motion
         core = [0.0, 0.0, steering, math.hypot(v_x, v_y), 0.0, yaw_rate, math.atan2(v_y, v_x)]
         if fresh:
-            self.p = plain(self.vehicle, {**self.values, **parameters})
+            self.p = plain(self.given, parameters)
             self.x = core if self.model == "st" else list(self.init(core, self.p))
         x = self.x
         if self.model == "mb":
@@ -90,9 +93,9 @@ class CommonRoad(Simulator):
         return [x[3] * math.cos(x[6]), x[3] * math.sin(x[6]), x[5], x[2]]
 
 
-def plain(vehicle, values):
+def plain(given, values):
     """A vehicle's parameters with some of them changed."""
-    p = setup_vehicle_parameters(vehicle_id=vehicle)
+    p = copy.deepcopy(given)
     for name, value in values.items():
         *way, last = name.split(".")
         node = p
@@ -106,7 +109,7 @@ def plain(vehicle, values):
 
 
 def main():
-    options = dict(a.split("=", 1) for a in sys.argv[2:])
+    options = read_options("model", "vehicle", "step_s")
     values = read_values(sys.argv[1] if len(sys.argv) > 1 else "")
     model = options.get("model", "st")
     if model not in MORE:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gripsight_simulator import Simulator, keys_of, read_values, serve
+from gripsight_simulator import Simulator, keys_of, read_options, read_values, serve
 
 BOUNDS = {
     "mu": (0.2, 2.0, "1", None), "C_Sf": (1.0, 15.0, "1/rad", "front_axle"), "C_Sr": (1.0, 15.0, "1/rad", "rear_axle"),
@@ -101,7 +101,7 @@ class F1tenthGym(Simulator):
 
 
 def main():
-    options = dict(a.split("=", 1) for a in sys.argv[2:])
+    options = read_options("checkout", "timestep", "integrator", "steer_buffer_size")
     values = read_values(sys.argv[1] if len(sys.argv) > 1 else "")
     dynamics = load_dynamics(options.get("checkout", "f1tenth_gym"))
     size = int(options.get("steer_buffer_size", 2))

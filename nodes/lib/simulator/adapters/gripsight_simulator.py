@@ -96,7 +96,7 @@ class Simulator:
         along = self.states.index("v_x_mps") if v_x is not None else None
         place_at = dict(zip(batch.place_steps.tolist(), range(len(motions))))
         wanted = dict(zip(batch.output_steps.tolist(), range(len(batch.output_steps))))
-        rows = np.empty((len(batch.output_steps), len(self.outputs)))
+        rows = [[float("nan")] * len(self.outputs)] * len(batch.output_steps)
         seen, fresh = None, True
         for k in range(batch.steps + 1):
             at = place_at.get(k)
@@ -115,7 +115,16 @@ class Simulator:
                 rows[row] = seen
             if k < batch.steps and seen is not None:
                 seen = self.step(commands[k])
-        return rows
+        return np.array(rows, dtype=np.float64)
+
+
+def read_options(*known):
+    """The options of the simulator's file, NAME=VALUE behind the parameter file's path; ends where one is not known."""
+    options = dict(a.split("=", 1) for a in sys.argv[2:])
+    for name in options:
+        if name not in known:
+            sys.exit(f"options: there is no '{name}' here; {', '.join(known)} are possible")
+    return options
 
 
 def read_values(path):

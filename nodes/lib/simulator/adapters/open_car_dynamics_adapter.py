@@ -20,7 +20,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from gripsight_simulator import Library, serve
+from gripsight_simulator import Library, read_options, serve
 
 CAR = "vehicle_dynamics_single_track."
 STEP_S = 0.004
@@ -113,9 +113,12 @@ class OpenCarDynamics(Library):
             return
         value = float(values[changed[0]])
         low, high = sorted((0.3 * value, 3.0 * value))
-        # One of gripsight's parameters stands once in the file; the tire of an axle twice, which a patch of one value cannot say.
-        where = {"key": changed[0]} if len(changed) == 1 else {"in_code": " and ".join(changed) + " of the parameter file"}
-        self.parameters.append(dict(name=name, value=value, low=low, high=high, unit=unit, site=site, **where))
+        wheelbase_m = next((float(v) for n, v in values.items() if n.endswith(".wheelbase_m")), None)
+        if name.startswith("cog.") and wheelbase_m:
+            # Between the axles.
+            low, high = min(value, 0.2 * wheelbase_m), max(value, 0.8 * wheelbase_m)
+        # The tire of an axle stands in the file once a wheel.
+        self.parameters.append(dict(name=name, value=value, low=low, high=high, unit=unit, site=site, key=changed))
         self.changes.append(changed)
 
     def _pass(self, batch, b):
@@ -138,7 +141,7 @@ class Wide:
 
 
 def main():
-    options = dict(a.split("=", 1) for a in sys.argv[2:])
+    options = read_options("checkout", "tire", "eigen")
     checkout = Path(options.get("checkout", "Open-Car-Dynamics")).resolve()
     library = built(checkout, options.get("tire", "MF_Simple"), options.get("eigen", "/usr/include"))
     text = Path(sys.argv[1]).read_text() if len(sys.argv) > 1 and sys.argv[1] else "{}"

@@ -11,7 +11,7 @@ import sys
 
 import slipx
 
-from gripsight_simulator import Simulator, read_values, serve
+from gripsight_simulator import Simulator, read_options, read_values, serve
 
 BOUNDS = {
     "mass": (0.5, 5.0, "kg", "loads_and_body"), "izz": (0.2, 5.0, "kg m2", "loads_and_body"), "lf": (0.5, 2.0, "m", "loads_and_body"),
@@ -74,7 +74,7 @@ class Slipx(Simulator):
 
 
 def main():
-    options = dict(a.split("=", 1) for a in sys.argv[2:])
+    options = read_options("tier", "step_s")
     values = read_values(sys.argv[1] if len(sys.argv) > 1 else "")
     unknown = [name for name in values if name not in BOUNDS]
     reference = slipx.load_reference_car().params

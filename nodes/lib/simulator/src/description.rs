@@ -1,6 +1,6 @@
 //! What a simulator says of itself.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::SimulatorError;
 
@@ -73,9 +73,10 @@ pub struct SimulatorParameter {
     /// Its unit; `1` for none.
     #[serde(default = "one")]
     pub unit: String,
-    /// Where it stands in the parameter file: the keys that lead to it, joined by dots (`tire.p_dy1`).
-    #[serde(default)]
-    pub key: Option<String>,
+    /// Where it stands in the parameter file: the keys that lead to it, joined by dots (`tire.p_dy1`); one text, or a list where the same
+    /// figure stands in several places (the tires of an axle, wheel by wheel).
+    #[serde(default, rename = "key", deserialize_with = "one_or_more")]
+    pub keys: Vec<String>,
     /// Where it stands in the code, in words; such a parameter is never patched.
     #[serde(default)]
     pub in_code: Option<String>,
@@ -89,6 +90,20 @@ pub struct SimulatorParameter {
 
 fn one() -> String {
     "1".to_owned()
+}
+
+fn one_or_more<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<String>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Keys {
+        One(String),
+        More(Vec<String>),
+    }
+    Ok(match Option::<Keys>::deserialize(deserializer)? {
+        None => Vec::new(),
+        Some(Keys::One(key)) => vec![key],
+        Some(Keys::More(keys)) => keys,
+    })
 }
 
 /// What a simulator says of itself.

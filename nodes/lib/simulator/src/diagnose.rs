@@ -22,11 +22,9 @@ use crate::{Channel, Commands, Drive, Model, Roll, SimulatorError, SimulatorFile
 const MATTERS: f64 = 0.1;
 /// How sure free terms must be, in standard deviations over held-out blocks.
 const SURE_Z: f64 = 2.0;
-/// A gap below this, times the noise, is none.
+/// A gap below this, times the noise, is none: of the simulator as it came, and of what its best parameters leave. With the right terms a fit
+/// comes down to the noise.
 const NO_GAP: f64 = 1.5;
-/// Where the best of the simulator's parameters leave more than this, times the noise, the simulator has no term for the rest: with the right
-/// terms a fit comes down to the noise.
-const UNEXPLAINED: f64 = 3.0;
 
 /// What is asked.
 #[derive(Debug)]
@@ -82,17 +80,18 @@ pub fn diagnose(
     };
     let (nominal, left) = (error(&null), error(after));
     // Nothing was fitted to it: every window counts, and one in which the car nearly spun does not make a gap.
-    let as_it_came = Scored::everywhere(layout, model.free.len()).estimate(&[&null], |e| e[0]).value;
+    let as_it_came = Scored::everywhere(layout, model.free.len()).estimate(&[&null], |e| e[0]).low;
     let free_closes = closed(after, &flexible.all);
     let z = scored.z(after, &flexible.all);
     let terms_help = z > SURE_Z && free_closes.value > MATTERS;
-    let unexplained = !found.fits.is_empty() && left.low > UNEXPLAINED * floor;
-    let is_missing = nominal.value > NO_GAP * floor && (terms_help || unexplained);
+    // A gap all over the drive that no parameter explains is the simulator's, whether anything was named or not.
+    let unexplained = left.low > NO_GAP * floor;
+    let is_missing = unexplained || nominal.value > NO_GAP * floor && terms_help;
     let named_close = closed(&null, after);
     let verdict = match () {
         () if is_missing => Verdict::MissingStructure,
         () if !found.fits.is_empty() => Verdict::Effects,
-        // A few blocks may hold all of it: its lower end says nothing then.
+        // A few blocks hold all of it: something happened there, which need not be the simulator's.
         () if as_it_came > NO_GAP * floor => Verdict::NoneOfThese,
         () => Verdict::NoGap,
     };
@@ -184,15 +183,15 @@ pub struct Verified {
     pub is_clearly_less: bool,
 }
 
-/// Error of a simulator over the noise, with effects around it at given sizes: what a patch is verified by. `as_it_came`: the residuals of a
-/// diagnosis of the same drive ([`SimulatorDiagnosis::residuals`]).
+/// Error of a simulator over the noise, with given sizes of effects around it and of its own parameters: what a patch is verified by.
+/// `as_it_came`: the residuals of a diagnosis of the same drive ([`SimulatorDiagnosis::residuals`]).
 ///
 /// # Errors
 /// [`SimulatorError`].
 pub fn error_over(
     roll: &dyn Roll,
     question: &Question<'_>,
-    around: &[(String, f64)],
+    sizes: &[(String, f64)],
     span: Span,
     as_it_came: &[f64],
 ) -> Result<Verified, SimulatorError> {
@@ -212,7 +211,7 @@ pub fn error_over(
     }
     let mut point = model.null();
     for (c, value) in list.iter().zip(&mut point.values) {
-        let known = around.iter().find(|(name, _)| !c.is_own() && *name == c.name);
+        let known = sizes.iter().find(|(name, _)| *name == c.name);
         *value = known.map_or(*value, |(_, size)| *size);
     }
     let state = fitter.at(point)?;

@@ -29,6 +29,13 @@ pub(crate) struct Fitted {
     pub(crate) is_settled: bool,
 }
 
+impl Fitted {
+    /// Whether the candidate fitted last is there: its size over its standard error is more than chance gives.
+    pub(crate) fn is_evident(&self) -> bool {
+        self.sizes.last().is_some_and(|s| s.wald > s.needed)
+    }
+}
+
 /// A fitted size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Size {

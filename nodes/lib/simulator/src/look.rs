@@ -5,6 +5,8 @@ use crate::fit::{Fitter, State};
 use crate::linear::Normal;
 use crate::model::Residuals;
 
+/// Rollouts that following a candidate takes at most.
+pub(crate) const LOOKS: usize = 3;
 /// Shares of a value: far from it, and around the best ever closer.
 const FAR: [f64; 3] = [0.5, 0.75, 1.4];
 const CLOSER: [[f64; 4]; 3] = [[0.8, 0.9, 1.1, 1.2], [0.94, 0.97, 1.03, 1.06], [0.98, 0.99, 1.01, 1.02]];
@@ -116,7 +118,6 @@ impl Fitter<'_> {
         columns: &[Residuals],
         likely: &[(usize, f64, Vec<f64>)],
     ) -> Result<Vec<(usize, State)>, SimulatorError> {
-        const LOOKS: usize = 3;
         let layout = &self.layout;
         let all: Vec<(usize, &Residuals)> = columns.iter().enumerate().collect();
         let along = |(_, _, end): &(usize, f64, Vec<f64>), share: f64| -> Vec<f64> {

@@ -13,9 +13,9 @@ pub enum Verdict {
     Effects,
     /// Simulator and car agree within the noise.
     NoGap,
-    /// The simulator has no term for a good part of the gap.
+    /// The simulator has no term for a part of the gap.
     MissingStructure,
-    /// There is a gap that neither parameters nor free terms explain.
+    /// A few stretches of the drive hold a gap that neither parameters nor free terms explain.
     NoneOfThese,
 }
 

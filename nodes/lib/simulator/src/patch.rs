@@ -46,14 +46,16 @@ pub fn patch(
     for (name, value) in changes {
         let Some(p) = description.parameters.iter().find(|p| p.name == *name) else { continue };
         let value = if p.integer { value.round() } else { *value };
-        match (&p.key, &path) {
-            (Some(key), Some(path)) => {
-                text = with_value(&text, key, p.value, value)
-                    .map_err(|why| SimulatorError::Patch { path: path.clone(), why })?;
+        match &path {
+            Some(path) if !p.keys.is_empty() => {
+                for key in &p.keys {
+                    text = with_value(&text, key, p.value, value)
+                        .map_err(|why| SimulatorError::Patch { path: path.clone(), why })?;
+                }
                 changed.push((name.clone(), value));
             }
             _ => {
-                let place = p.in_code.clone().or_else(|| p.key.clone()).unwrap_or_else(|| p.name.clone());
+                let place = p.in_code.as_ref().or_else(|| p.keys.first()).unwrap_or(&p.name);
                 by_hand.push(format!("{name}: {} to {} ({place})", number(p.value), number(value)));
             }
         }

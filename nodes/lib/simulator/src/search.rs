@@ -13,6 +13,7 @@
 use crate::SimulatorError;
 use crate::fit::{Fitted, Fitter, State, needed};
 use crate::linear::Normal;
+use crate::look::LOOKS;
 use crate::model::Residuals;
 
 /// Candidates that are followed along their line in a round.
@@ -176,10 +177,8 @@ impl Fitter<'_> {
         likely.extend(seen);
         found.mute.extend(mute);
         likely.sort_by(|a, b| b.1.total_cmp(&a.1));
-        likely.truncate(FOLLOWED);
-        let followed = self.follow(&state, &columns, &likely)?;
-        let compared: Vec<(usize, f64)> = followed.iter().map(|(c, s)| (*c, s.training(layout))).collect();
-        let mut round = Round { compared, confused: Vec::new() };
+        let unlikely = likely.split_off(FOLLOWED.min(likely.len()));
+        let mut followed = self.follow(&state, &columns, &likely)?;
         // Where even the best gains less than its name costs, nothing is fitted.
         let needed = self.needed();
         let mut fits: Vec<Fitted> = Vec::new();
@@ -207,8 +206,25 @@ impl Fitter<'_> {
                 fits.push(fit(c, &trial)?);
             }
         }
-        found.columns = columns;
         fits.sort_by(|a, b| a.state.training(layout).total_cmp(&b.state.training(layout)));
+        // What shows in a few windows alone, such as a grip that the simulator does not reach, is unlikely by its derivatives: where most is
+        // left, or much and nothing is evident, the others are followed as well.
+        let left = fits.first().map_or(before, |f| f.state.training(layout));
+        let affordable = self.rollouts() + (LOOKS * unlikely.len()) as f64 + FIT <= MOST_ROLLOUTS;
+        let is_slow = left > SLOW * before || !fits.first().is_some_and(Fitted::is_evident);
+        if is_slow && left > UNEXPLAINED * self.residuals() && affordable {
+            let more = self.follow(&state, &columns, &unlikely)?;
+            let likeliest = followed.first().map_or(before, |(_, trial)| trial.training(layout));
+            if let Some((c, trial)) = more.first().filter(|(_, trial)| trial.training(layout) < likeliest) {
+                fits.push(fit(*c, trial)?);
+                fits.sort_by(|a, b| a.state.training(layout).total_cmp(&b.state.training(layout)));
+            }
+            followed.extend(more);
+            followed.sort_by(|a, b| a.1.training(layout).total_cmp(&b.1.training(layout)));
+        }
+        let compared = followed.iter().map(|(c, s)| (*c, s.training(layout))).collect();
+        let mut round = Round { compared, confused: Vec::new() };
+        found.columns = columns;
         if let Some(best) = fits.first_mut()
             && !best.is_settled
             && self.rollouts() + FIT <= MOST_ROLLOUTS
@@ -244,9 +260,8 @@ impl Fitter<'_> {
             round.confused.retain(|c| *c != now);
             round.confused.push(was);
         }
-        let evident = chosen.sizes.last().is_some_and(|s| s.wald > s.needed);
         let carries_over = chosen.state.held_out(layout) < state.held_out(layout);
-        Ok((round, (evident && carries_over).then(|| chosen.clone())))
+        Ok((round, (chosen.is_evident() && carries_over).then(|| chosen.clone())))
     }
 
     /// As far as derivatives reach: what each candidate would gain beside those found, and where it would come to lie.

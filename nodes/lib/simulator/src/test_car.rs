@@ -30,7 +30,7 @@ impl TestCar {
             low,
             high,
             unit: "1".to_owned(),
-            key: (!integer).then(|| name.to_owned()),
+            keys: (!integer).then(|| name.to_owned()).into_iter().collect(),
             in_code: integer.then(|| "the buffer".to_owned()),
             integer,
             site: None,

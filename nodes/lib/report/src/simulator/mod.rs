@@ -120,7 +120,7 @@ fn patch(d: &SimulatorDiagnosis, said: &PatchSaid) -> Markup {
         @if said.is_no_better { p { "The patched simulator does no better on held-out data, as far as these tell: no patch is given." } }
         @else if !said.diff.is_empty() { pre { (said.diff) } }
         @else { p { "Nothing of the parameter file is to be changed." } }
-        (list(&said.by_hand, ""))
+        @if !said.by_hand.is_empty() { p { "To be changed by hand:" } (list(&said.by_hand, "")) }
     }
 }
 

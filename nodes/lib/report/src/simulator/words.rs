@@ -7,6 +7,9 @@ use gripsight_simulator::{RankedEffect, Reason, SimulatorDiagnosis, Verdict};
 use super::PatchSaid;
 use crate::text::{estimate_of, fixed, percent, percent_estimate, significant};
 
+/// Share of the gap below which a term is not told: it would read as 0 %.
+const SHOWN: f64 = 0.005;
+
 /// The verdict in a sentence.
 pub(super) fn sentence(d: &SimulatorDiagnosis) -> String {
     let named: Vec<String> =
@@ -22,7 +25,8 @@ pub(super) fn sentence(d: &SimulatorDiagnosis) -> String {
             format!("Simulator and car agree: {} times the noise.", significant(d.gap.nominal.value, 3))
         }
         Verdict::MissingStructure => {
-            let first = d.missing.first().map_or_else(String::new, |m| {
+            let largest = d.missing.first().filter(|m| m.closed_fraction >= SHOWN);
+            let first = largest.map_or_else(String::new, |m| {
                 format!(
                     "; free terms like {} would close {} of the gap",
                     m.name.replace('_', " "),
@@ -31,10 +35,10 @@ pub(super) fn sentence(d: &SimulatorDiagnosis) -> String {
             });
             let beside =
                 if named.is_empty() { String::new() } else { format!(" beside {}", named.join(" and ")) };
-            format!("The simulator has no term for a good part of the gap{beside} ({gap}){first}.")
+            format!("The simulator has no term for what is left of the gap{beside} ({gap}){first}.")
         }
         Verdict::NoneOfThese => format!(
-            "There is a gap of {} times the noise that neither its parameters nor free terms explain.",
+            "A few stretches of the drive hold a gap ({} times the noise over all of it) that neither its parameters nor free terms explain.",
             significant(d.gap.nominal.value, 3)
         ),
     }
@@ -71,6 +75,7 @@ pub(super) fn missing(d: &SimulatorDiagnosis) -> Vec<String> {
     let has_none = |name: &str| d.simulator.lacks.iter().any(|l| l == name);
     d.missing
         .iter()
+        .filter(|m| m.closed_fraction >= SHOWN)
         .map(|m| {
             let name = m.name.replace('_', " ");
             let share = percent(m.closed_fraction);
@@ -90,6 +95,11 @@ pub(super) fn reason(r: &Reason) -> String {
             "Rollouts of the simulator as it came miss held-out data by {} times the noise, with what was found by {}.",
             significant(*nominal, 3),
             significant(*after, 3)
+        ),
+        Reason::Taken { name, wald, needed } if wald < needed => format!(
+            "{name} was taken; beside what was found after it its size over its standard error, squared, is {} (by itself it needed {}).",
+            significant(*wald, 3),
+            significant(*needed, 3)
         ),
         Reason::Taken { name, wald, needed } => format!(
             "{name} was taken: its size over its standard error, squared, is {} ({} were needed).",
