@@ -142,6 +142,11 @@ impl Node {
         self.identity.fully_qualified()
     }
 
+    /// The DDS domain that it is in.
+    pub(crate) fn domain(&self) -> u16 {
+        self.domain_id
+    }
+
     /// The node's clock.
     pub fn clock(&self) -> Clock {
         self.clock.clone()
