@@ -4,6 +4,7 @@ ros2 launch launch_scripts/gripsight.launch.py vehicle:=car.yaml stack:=forzaeth
 ros2 launch launch_scripts/gripsight.launch.py vehicle:=car.yaml bag:=run.mcap rate:=10.0
 """
 
+from os.path import expanduser
 from pathlib import Path
 
 import yaml
@@ -34,6 +35,14 @@ ARGUMENTS = [
     ("drive", "", "drive the car, too: a parameter file of the node driver, its track among them"),
 ]
 
+# As ROS 2 writes a switch, and Python.
+SWITCH = ["true", "false", "True", "False"]
+
+
+def is_true(text: str) -> bool:
+    """What a switch says."""
+    return text.lower() == "true"
+
 
 def topics_of(stack: str, namespace: str) -> dict:
     """The car's topic for each of the suite's names; in a namespace they are relative to it."""
@@ -61,7 +70,8 @@ def check(value: dict) -> None:
 
 def nodes(context):
     """The nodes, as the launch arguments say. The end of one ends the suite: it runs whole or not at all."""
-    value = {name: LaunchConfiguration(name).perform(context) for name, _, _ in ARGUMENTS}
+    # A shell leaves the ~ of `vehicle:=~/car.yaml` as it is.
+    value = {name: expanduser(LaunchConfiguration(name).perform(context)) for name, _, _ in ARGUMENTS}
     check(value)
     space = value["namespace"].strip("/")
     topics = topics_of(value["stack"], space)
@@ -102,12 +112,12 @@ def nodes(context):
             ],
         ),
     ]
-    if value["camera"] == "true":
+    if is_true(value["camera"]):
         settings = [str(project_folder() / "params" / "camera_prior.yaml")]
         started.append(node("camera_prior", [*remaps("odom", "image", "image/compressed"), ("pacejka", "identifier/pacejka")], defaults=settings))
     elif value["prior_mu"]:
         started.append(node("camera_prior", input="none", configured_mu=float(value["prior_mu"])))
-    if value["gap"] == "true":
+    if is_true(value["gap"]):
         # The diagnosis never stands in the way of the other nodes.
         topics_in = [("sequence", "telemetry/sequence"), ("posterior", "identifier/posterior")]
         started.append(node("gap_diagnosis", topics_in, prefix="nice -n 10"))
@@ -137,9 +147,7 @@ def nodes(context):
 def generate_launch_description():
     """What ros2 launch calls."""
     declared = [
-        DeclareLaunchArgument(name, default_value=default, description=text)
-        if default is not None
-        else DeclareLaunchArgument(name, description=text)
+        DeclareLaunchArgument(name, default_value=default, description=text, choices=SWITCH if default == "false" else None)
         for name, default, text in ARGUMENTS
     ]
     return LaunchDescription([*declared, OpaqueFunction(function=nodes)])
