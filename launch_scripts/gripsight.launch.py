@@ -68,6 +68,13 @@ def check(value: dict) -> None:
         raise RuntimeError(f"bag:={value['bag']}: no such bag")
 
 
+def ended(event, context):
+    """Ends the suite with a node; by an error, which is ros2 launch's exit code 1, where it failed and was not asked to end."""
+    if event.returncode and not context.is_shutdown:
+        raise RuntimeError(f"{event.process_name} ended with exit code {event.returncode}, and the suite with it")
+    return EmitEvent(event=Shutdown(reason=f"{event.process_name} ended"))
+
+
 def nodes(context):
     """The nodes, as the launch arguments say. The end of one ends the suite: it runs whole or not at all."""
     # A shell leaves the ~ of `vehicle:=~/car.yaml` as it is.
@@ -88,12 +95,14 @@ def nodes(context):
             package=f"gripsight_{name}",
             executable=name,
             name=name,
+            # In launch's own lines; it would name the prefix.
+            exec_name=name,
             namespace=f"/{space}" if space else None,
             parameters=[*defaults, value["params"], value["vehicle"], {**replay, **parameters}],
             remappings=list(remappings),
             # On the terminal, and in a file of the launch's log folder.
             output="both",
-            on_exit=[EmitEvent(event=Shutdown(reason=f"{name} ended"))],
+            on_exit=ended,
         )
 
     started = [
@@ -134,11 +143,10 @@ def nodes(context):
             output="both",
         )
         end = [TimerAction(period=float(value["linger_s"]), actions=[EmitEvent(event=Shutdown(reason="bag played"))])]
-        failed = [EmitEvent(event=Shutdown(reason="the bag was not played to its end"))]
         started += [
             player,
             RegisterEventHandler(
-                OnProcessExit(target_action=player, on_exit=lambda event, _: failed if event.returncode else end)
+                OnProcessExit(target_action=player, on_exit=lambda event, context: ended(event, context) if event.returncode else end)
             ),
         ]
     return started
