@@ -306,6 +306,8 @@ impl Node {
     fn follow_clock(&mut self, use_sim_time: bool) -> Result<(), Error> {
         if use_sim_time {
             let mut ticks = self.subscription::<ClockMessage>("/clock", Qos::sensor(1))?;
+            // Without it time stands still, whatever else arrives.
+            self.needs([ticks.arrivals()]);
             let clock = self.clock.clone();
             self.spawn(async move {
                 while let Some(tick) = ticks.next().await {

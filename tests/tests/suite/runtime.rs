@@ -60,6 +60,13 @@ fn a_peer_sees_one_type_on_the_clock() {
     assert!(peer.wait(PATIENCE).success());
 }
 
+#[test]
+fn a_node_whose_time_stands_still_says_so() {
+    let domain = Domain::new();
+    let node = source(&domain, &["-p", "use_sim_time:=true"]);
+    node.wait_for_log("nothing arrives on /clock", PATIENCE);
+}
+
 /// By their hash tools of ROS 2 tell types apart, and of an endpoint without one its middlewares warn, each time.
 #[test]
 fn endpoints_are_announced_with_the_hash_of_their_type() {
