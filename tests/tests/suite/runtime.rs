@@ -242,8 +242,9 @@ fn logs_reach_rosout_and_late_joiners() {
         &cyclone.unwrap(),
         &["subscribe", "/rosout", "rcl_interfaces/msg/Log", "--qos", "latched"],
     );
+    // That it publishes, or that it has started: the reader keeps one line of those that come at once.
     let line: Log = message(&listener);
-    assert_eq!(line.msg, "car publishes as /car/result_source");
+    assert!(line.msg.contains("/car/result_source"), "{}", line.msg);
     assert_eq!((line.name.as_str(), line.level), ("car.result_source", Log::INFO));
 }
 
