@@ -19,6 +19,8 @@ ARGUMENTS = [
     ("prior_mu", "", "publish this friction prior"),
     ("camera", "false", "use the camera's pictures for the friction prior"),
 ]
+# As ROS 2 writes a switch, and Python.
+SWITCH = ["true", "false", "True", "False"]
 # The names of params/stacks/gripsight.yaml.
 TOPICS = [
     ("odom", "/car_state/odom"),
@@ -45,7 +47,7 @@ def nodes(context):
                 "track": value["track"],
                 "mu": float(value["mu"]),
                 "write_folder": folder,
-                "camera_rate_hz": 5.0 if value["camera"] == "true" else 0.0,
+                "camera_rate_hz": 5.0 if value["camera"].lower() == "true" else 0.0,
             }
         ],
         remappings=TOPICS,
@@ -66,5 +68,8 @@ def nodes(context):
 
 def generate_launch_description():
     """What ros2 launch calls."""
-    declared = [DeclareLaunchArgument(name, default_value=default, description=text) for name, default, text in ARGUMENTS]
+    declared = [
+        DeclareLaunchArgument(name, default_value=default, description=text, choices=SWITCH if default == "false" else None)
+        for name, default, text in ARGUMENTS
+    ]
     return LaunchDescription([*declared, OpaqueFunction(function=nodes)])

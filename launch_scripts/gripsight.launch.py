@@ -4,6 +4,7 @@ ros2 launch launch_scripts/gripsight.launch.py vehicle:=car.yaml stack:=forzaeth
 ros2 launch launch_scripts/gripsight.launch.py vehicle:=car.yaml bag:=run.mcap rate:=10.0
 """
 
+from os.path import expanduser
 from pathlib import Path
 
 import yaml
@@ -34,6 +35,14 @@ ARGUMENTS = [
     ("drive", "", "drive the car, too: a parameter file of the node driver, its track among them"),
 ]
 
+# As ROS 2 writes a switch, and Python.
+SWITCH = ["true", "false", "True", "False"]
+
+
+def is_true(text: str) -> bool:
+    """What a switch says."""
+    return text.lower() == "true"
+
 
 def topics_of(stack: str, namespace: str) -> dict:
     """The car's topic for each of the suite's names; in a namespace they are relative to it."""
@@ -59,9 +68,17 @@ def check(value: dict) -> None:
         raise RuntimeError(f"bag:={value['bag']}: no such bag")
 
 
+def ended(event, context):
+    """Ends the suite with a node; by an error, which is ros2 launch's exit code 1, where it failed and was not asked to end."""
+    if event.returncode and not context.is_shutdown:
+        raise RuntimeError(f"{event.process_name} ended with exit code {event.returncode}, and the suite with it")
+    return EmitEvent(event=Shutdown(reason=f"{event.process_name} ended"))
+
+
 def nodes(context):
     """The nodes, as the launch arguments say. The end of one ends the suite: it runs whole or not at all."""
-    value = {name: LaunchConfiguration(name).perform(context) for name, _, _ in ARGUMENTS}
+    # A shell leaves the ~ of `vehicle:=~/car.yaml` as it is.
+    value = {name: expanduser(LaunchConfiguration(name).perform(context)) for name, _, _ in ARGUMENTS}
     check(value)
     space = value["namespace"].strip("/")
     topics = topics_of(value["stack"], space)
@@ -78,12 +95,14 @@ def nodes(context):
             package=f"gripsight_{name}",
             executable=name,
             name=name,
+            # In launch's own lines; it would name the prefix.
+            exec_name=name,
             namespace=f"/{space}" if space else None,
             parameters=[*defaults, value["params"], value["vehicle"], {**replay, **parameters}],
             remappings=list(remappings),
             # On the terminal, and in a file of the launch's log folder.
             output="both",
-            on_exit=[EmitEvent(event=Shutdown(reason=f"{name} ended"))],
+            on_exit=ended,
         )
 
     started = [
@@ -102,12 +121,12 @@ def nodes(context):
             ],
         ),
     ]
-    if value["camera"] == "true":
+    if is_true(value["camera"]):
         settings = [str(project_folder() / "params" / "camera_prior.yaml")]
         started.append(node("camera_prior", [*remaps("odom", "image", "image/compressed"), ("pacejka", "identifier/pacejka")], defaults=settings))
     elif value["prior_mu"]:
         started.append(node("camera_prior", input="none", configured_mu=float(value["prior_mu"])))
-    if value["gap"] == "true":
+    if is_true(value["gap"]):
         # The diagnosis never stands in the way of the other nodes.
         topics_in = [("sequence", "telemetry/sequence"), ("posterior", "identifier/posterior")]
         started.append(node("gap_diagnosis", topics_in, prefix="nice -n 10"))
@@ -124,11 +143,10 @@ def nodes(context):
             output="both",
         )
         end = [TimerAction(period=float(value["linger_s"]), actions=[EmitEvent(event=Shutdown(reason="bag played"))])]
-        failed = [EmitEvent(event=Shutdown(reason="the bag was not played to its end"))]
         started += [
             player,
             RegisterEventHandler(
-                OnProcessExit(target_action=player, on_exit=lambda event, _: failed if event.returncode else end)
+                OnProcessExit(target_action=player, on_exit=lambda event, context: ended(event, context) if event.returncode else end)
             ),
         ]
     return started
@@ -137,9 +155,7 @@ def nodes(context):
 def generate_launch_description():
     """What ros2 launch calls."""
     declared = [
-        DeclareLaunchArgument(name, default_value=default, description=text)
-        if default is not None
-        else DeclareLaunchArgument(name, description=text)
+        DeclareLaunchArgument(name, default_value=default, description=text, choices=SWITCH if default == "false" else None)
         for name, default, text in ARGUMENTS
     ]
     return LaunchDescription([*declared, OpaqueFunction(function=nodes)])

@@ -7,6 +7,7 @@
     cyclone_peer.py serve SERVICE TYPE REPLY            the same service offered: prints each request and answers REPLY, until --count came
     cyclone_peer.py types TOPIC TYPE [--count N]        the types that endpoints of a topic are announced with, once N endpoints stand and
                                                         none has come for two seconds; exit code 1: others than TYPE
+    cyclone_peer.py user_data TOPIC TYPE [--count N]    the user data that they are announced with
 
 Messages are printed as JSON lines, one object each, with the field names of the .msg files; the line `ready` says that the
 endpoint stands. Exit code 1: not all messages came in time.
@@ -158,7 +159,8 @@ def publish(participant, args):
     return came
 
 
-def types(participant, args):
+def endpoints(participant, args):
+    """Readers and writers of a topic as they are announced, once enough stand and none has come for two seconds."""
     from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription
 
     readers = [BuiltinDataReader(participant, kind) for kind in (BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription)]
@@ -169,13 +171,24 @@ def types(participant, args):
         nonlocal last
         for endpoint in (sample for reader in readers for sample in reader.take(N=100)):
             if endpoint.sample_info.valid_data and endpoint.topic_name == "rt" + args.topic and endpoint.key not in found:
-                found[endpoint.key], last = endpoint.type_name, time.monotonic()
+                found[endpoint.key], last = endpoint, time.monotonic()
         return len(found) >= args.count and time.monotonic() - last > 2.0
 
-    is_settled = wait_until(settled, args.timeout)
-    names = sorted({name.replace("::dds_::", "::").replace("::", "/").rstrip("_") for name in found.values()})
+    return wait_until(settled, args.timeout), found.values()
+
+
+def types(participant, args):
+    is_settled, found = endpoints(participant, args)
+    names = sorted({end.type_name.replace("::dds_::", "::").replace("::", "/").rstrip("_") for end in found})
     print(json.dumps(names), flush=True)
     return is_settled and names == [args.type]
+
+
+def user_data(participant, args):
+    is_settled, found = endpoints(participant, args)
+    data = [end.qos[Policy.Userdata] if Policy.Userdata in end.qos else None for end in found]
+    print(json.dumps(sorted({entry.data.decode() if entry else "" for entry in data})), flush=True)
+    return is_settled
 
 
 def service(participant, args):
@@ -233,7 +246,7 @@ def call(participant, args):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("command", choices=["subscribe", "publish", "call", "serve", "types"])
+    parser.add_argument("command", choices=["subscribe", "publish", "call", "serve", "types", "user_data"])
     parser.add_argument("topic")
     parser.add_argument("type")
     parser.add_argument("request", nargs="?")
@@ -244,7 +257,8 @@ def main():
     parser.add_argument("--stamp", action="store_true")
     parser.add_argument("--timeout", type=float, default=50.0)
     args = parser.parse_args()
-    work = {"subscribe": subscribe, "publish": publish, "call": call, "serve": serve, "types": types}[args.command]
+    commands = (subscribe, publish, call, serve, types, user_data)
+    work = next(command for command in commands if command.__name__ == args.command)
     sys.exit(0 if work(DomainParticipant(int(os.environ.get("ROS_DOMAIN_ID", 0))), args) else 1)
 
 

@@ -52,6 +52,10 @@ impl Process {
     /// When it cannot be started.
     pub fn start(domain: &Domain, mut command: Command) -> Self {
         let name = format!("{command:?}");
+        // As a sourced ROS 2 may have it: nodes would then answer its peers alone.
+        if !command.get_envs().any(|(name, _)| name == "RMW_IMPLEMENTATION") {
+            command.env_remove("RMW_IMPLEMENTATION");
+        }
         command
             .envs(domain.environment())
             .stdin(Stdio::piped())

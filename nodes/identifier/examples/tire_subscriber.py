@@ -74,6 +74,7 @@ def main():
     """The node: says what it would plan with."""
     import rclpy
     from gripsight_msgs.msg import Grip, PacejkaParams
+    from rclpy.executors import ExternalShutdownException
     from rclpy.node import Node
     from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
@@ -92,7 +93,10 @@ def main():
     node.create_subscription(PacejkaParams, "/identifier/pacejka", lambda m: plan(tires.take(m)), latched)
     node.create_subscription(Grip, "/identifier/grip", lambda m: plan(tires.feel(m)), latched)
     plan(True)
-    rclpy.spin(node)
+    try:
+        rclpy.spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass  # Ctrl-C, or the launcher's end.
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ use crate::names::Identity;
 use crate::parameter_file::parameters_for;
 use crate::parameters::{Given, Origin};
 use crate::qos::Qos;
+use crate::type_hashes::user_data;
 use crate::value::ParameterValue;
 
 /// DDS is looked after this often.
@@ -46,6 +47,7 @@ pub(crate) fn overrides(args: &Args, name: &str, identity: &Identity) -> Result<
 }
 
 pub(crate) fn context(environment: &Environment) -> Result<Context, Error> {
+    rustdds::discovery::set_endpoint_user_data(user_data);
     let mut builder = DomainParticipantBuilder::new(environment.domain_id);
     if environment.localhost_only {
         builder = builder.with_only_networks([std::net::Ipv4Addr::LOCALHOST]);

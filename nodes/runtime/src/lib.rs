@@ -28,9 +28,8 @@
 //! }
 //! ```
 //!
-//! Not implemented: lifecycle nodes, composition, actions, services of a node's own other than triggers, clients other than of `set_parameters`, and type
-//! hashes in discovery: they travel as USER_DATA of an endpoint, which RustDDS 0.15.1 reads of others and cannot send (its QoS policies have
-//! none, and its announcements leave the parameter out); both RMWs of ROS 2 Jazzy accept that, rmw_cyclonedds with a warning.
+//! Not implemented: lifecycle nodes, composition, actions, services of a node's own other than triggers, and clients other than of
+//! `set_parameters`.
 
 mod args;
 mod clock;
@@ -54,6 +53,7 @@ mod readers;
 mod restart;
 mod run;
 mod subscription;
+mod type_hashes;
 mod value;
 mod vehicle;
 mod yaml;

@@ -142,6 +142,11 @@ impl Node {
         self.identity.fully_qualified()
     }
 
+    /// The DDS domain that it is in.
+    pub(crate) fn domain(&self) -> u16 {
+        self.domain_id
+    }
+
     /// The node's clock.
     pub fn clock(&self) -> Clock {
         self.clock.clone()
@@ -301,6 +306,8 @@ impl Node {
     fn follow_clock(&mut self, use_sim_time: bool) -> Result<(), Error> {
         if use_sim_time {
             let mut ticks = self.subscription::<ClockMessage>("/clock", Qos::sensor(1))?;
+            // Without it time stands still, whatever else arrives.
+            self.needs([ticks.arrivals()]);
             let clock = self.clock.clone();
             self.spawn(async move {
                 while let Some(tick) = ticks.next().await {

@@ -239,13 +239,14 @@ fn accepted(
     message: rcl::ParameterValue,
 ) -> Result<ParameterValue, String> {
     let Declared { value: old, descriptor } = declared.get(name).ok_or("not declared")?;
-    if descriptor.read_only {
-        return Err("read-only: it is set when the node starts".into());
-    }
     let given = ParameterValue::from_message(message)
         .ok_or_else(|| wrong_type(old.type_name(), "no value, or bytes"))?;
     let given_type = given.type_name();
     let value = given.converted_to(old).ok_or_else(|| wrong_type(old.type_name(), given_type))?;
+    // What it is already it may be told: `ros2 param load` of what `ros2 param dump` wrote.
+    if descriptor.read_only && value != *old {
+        return Err("read-only: it is set when the node starts".into());
+    }
     descriptor.check(&value)?;
     Ok(value)
 }
@@ -359,6 +360,16 @@ mod tests {
             assert!(reason.contains(part), "{reason}");
         }
         assert_eq!((rate.get(), name.get().as_str()), (3.0, "a"));
+    }
+
+    #[test]
+    fn what_was_dumped_can_be_loaded() {
+        let store = store();
+        store.declare("name", String::from("a"), Descriptor::new("").read_only()).unwrap();
+        store.declare("share", 1.0, Descriptor::new("").read_only()).unwrap();
+        let dumped = vec![message("name", String::from("a")), message("share", 1.0)];
+        assert!(store.set(dumped).is_ok());
+        assert!(store.set(vec![message("share", 0.5)]).unwrap_err().contains("read-only"));
     }
 
     #[test]

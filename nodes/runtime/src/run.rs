@@ -61,6 +61,7 @@ where
         let mut node = Node::start(name, std::env::args(), &guard)?;
         let work = setup(&mut node)?;
         node.check_parameters()?;
+        tracing::info!("{} has started in DDS domain {}", node.name(), node.domain());
         let beat = guard.beat();
         let work = async {
             tokio::select! {

@@ -60,7 +60,8 @@ pub fn vehicle_parameters(node: &mut Node) -> Result<VehicleParameters, Error> {
     let vehicle = VehicleParameters { name: Some(name.get()).filter(|n| !n.is_empty()), ..vehicle };
     vehicle.checked().map_err(|error| match error {
         VehicleError::Parameter { name, got, must } => {
-            Error::parameter(&format!("vehicle.{name}"), format!("it is {got}, must be {must}"))
+            let is_missing = if got == 0.0 { "; the car's own file comes by --params-file" } else { "" };
+            Error::parameter(&format!("vehicle.{name}"), format!("it is {got}, must be {must}{is_missing}"))
         }
         other => Error::parameter("vehicle", other.to_string()),
     })

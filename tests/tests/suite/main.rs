@@ -14,6 +14,7 @@ mod identification;
 mod packaging;
 mod parameters;
 mod restart;
+mod ros2;
 mod runtime;
 mod sim_car;
 mod whole_suite;

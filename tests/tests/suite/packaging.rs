@@ -23,6 +23,8 @@ fn every_package_installs_the_manifest_that_it_inherits_from_and_is_built_for_re
         for file in files {
             assert!(folder.join(&file).exists(), "{}: {file}", folder.display());
         }
+        // Not handed to cargo as a crate that others build on: each cargo would write into Cargo.lock that it is unused.
+        assert!(manifest.contains("[package.metadata.ros-env]\ninclude = true\n"), "{}", folder.display());
         let colcon: serde_json::Value =
             serde_json::from_str(&std::fs::read_to_string(folder.join("colcon.pkg")).unwrap()).unwrap();
         assert_eq!(colcon["cargo-args"], serde_json::json!(["--release"]));
