@@ -30,6 +30,8 @@ sys.path[:0] = [str(ROOT / "nodes/lib/simulator/adapters"), str(Path(__file__).r
 from make_foreign_bags import START_NS, Bag, Driver, Track  # noqa: E402
 
 SAMPLE_S = 0.01
+# Exit code: this car cannot be kept on this track, draw another.
+NO_DRIVE = 3
 AROUND = {"delay_s": 0.0, "gain": 0.0, "offset_rad": 0.0, "x_m": 0.0, "scale": 0.0}
 WINDOW = 50
 DETECTION = 5.0
@@ -271,10 +273,12 @@ def main():
         try:
             print(json.dumps(record(a.out, a.simulator, changes, a.seed, a.duration, a.checkout, a.smooth, pace, a.car)))
             return
-        except RuntimeError as error:
+        except (RuntimeError, ArithmeticError) as error:
+            # A wheel that stands still is a division by zero in a multibody car.
             print(error, file=sys.stderr)
             pace *= 0.85
-    raise SystemExit("no pace keeps the car on the track")
+    print("no pace keeps the car on the track", file=sys.stderr)
+    raise SystemExit(NO_DRIVE)
 
 
 if __name__ == "__main__":

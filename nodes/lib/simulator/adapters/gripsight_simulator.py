@@ -114,7 +114,11 @@ class Simulator:
             if row is not None:
                 rows[row] = seen
             if k < batch.steps and seen is not None:
-                seen = self.step(commands[k])
+                try:
+                    seen = self.step(commands[k])
+                except ArithmeticError:
+                    # Python raises where others give inf and NaN: a car that these parameters do not keep on its wheels.
+                    seen = [float("nan")] * len(self.outputs)
         return np.array(rows, dtype=np.float64)
 
 

@@ -176,6 +176,28 @@ mod tests {
     }
 
     #[test]
+    fn a_figure_that_stands_in_several_places_is_changed_in_each() {
+        let parameter =
+            |key: &str| format!(r#"{{"name": "stiffness", "value": 10, "low": 5, "high": 20, {key}}}"#);
+        let keys =
+            |key: &str| serde_json::from_str::<crate::SimulatorParameter>(&parameter(key)).unwrap().keys;
+        assert_eq!(keys(r#""key": "a.b""#), ["a.b"]);
+        assert_eq!(keys(r#""key": null"#), [""; 0]);
+        assert_eq!(keys(r#""key": ["left.b", "right.b"]"#), ["left.b", "right.b"]);
+        use crate::Roll as _;
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("car.yaml"), "left: {b: 10}\nright: {b: 10}\n").unwrap();
+        let text = "command: [none]\nparameter_file: car.yaml";
+        let file = SimulatorFile::parse(text, folder.path()).unwrap();
+        let mut description = crate::test_car::TestCar::new().description().clone();
+        description.parameters =
+            vec![serde_json::from_str(&parameter(r#""key": ["left.b", "right.b"]"#)).unwrap()];
+        let found = patch(&file, &description, &[("stiffness".to_owned(), 7.0)]).unwrap().unwrap();
+        assert_eq!(found.text, "left: {b: 7.0}\nright: {b: 7.0}\n");
+        assert!(found.by_hand.is_empty() && found.changed.len() == 1);
+    }
+
+    #[test]
     fn numbers_are_written_as_people_do() {
         for (value, text) in [
             (3.47, "3.47"),

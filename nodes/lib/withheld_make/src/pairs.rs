@@ -24,6 +24,8 @@ use crate::{WithheldError, reference_pairs};
 pub(crate) const LEAST_SEVERITY: f64 = 2.0;
 /// What no parameter imitates of a structure that has to be found: squared, over the noise, per residual.
 pub(crate) const LEAST_EXCESS: f64 = 1.0;
+/// Exit code by which the maker says that this car cannot be kept on this track: another is drawn.
+const NO_DRIVE: i32 = 3;
 /// Draws until a change shows.
 pub(crate) const TRIES: usize = 20;
 /// The smallest change over the largest one that is drawn.
@@ -180,7 +182,9 @@ pub(crate) fn pair(
         };
         let asked = asked(planned.kind, simulator, random);
         let seed: u32 = random.random();
-        let made = run(settings, folder, name, car, &asked, seed, duration_s.min(most_s))?;
+        let Some(made) = run(settings, folder, name, car, &asked, seed, duration_s.min(most_s))? else {
+            continue;
+        };
         let hidden = made.excess.is_some_and(|excess| excess < LEAST_EXCESS);
         if hidden || made.changes.values().any(|c| c.severity < LEAST_SEVERITY) {
             continue;
@@ -259,17 +263,20 @@ fn run(
     asked: &[Asked],
     seed: u32,
     duration_s: f64,
-) -> Result<Made, WithheldError> {
+) -> Result<Option<Made>, WithheldError> {
     let mut command = Command::new(&settings.python);
     command.arg(&settings.maker).arg(folder).arg(name).args(asked.iter().map(|a| &a.argument));
     command.args(["--seed", &seed.to_string(), "--duration", &duration_s.to_string(), "--car", car]);
     command.env("PYTHONDONTWRITEBYTECODE", "1").env("OMP_NUM_THREADS", "1");
     let fail = |said: String| WithheldError::Maker { command: format!("{}", settings.maker.display()), said };
     let output = command.output().map_err(|e| fail(e.to_string()))?;
+    if output.status.code() == Some(NO_DRIVE) {
+        return Ok(None);
+    }
     if !output.status.success() {
         return Err(fail(String::from_utf8_lossy(&output.stderr).into_owned()));
     }
-    serde_json::from_slice(&output.stdout).map_err(|e| fail(e.to_string()))
+    serde_json::from_slice(&output.stdout).map(Some).map_err(|e| fail(e.to_string()))
 }
 
 fn sealed(effect: &str, key: &str, made: &MadeChange) -> SealedEffect {
@@ -312,13 +319,14 @@ mod tests {
         }
     }
 
-    /// A maker that finds that nothing shows unless asked with the seed of its second call.
+    /// A maker that finds that nothing shows at its first call, and keeps no car on the track at its second.
     const MAKER: &str = r#"
 folder=$1
 echo "adapter: $2" > $folder/simulator.yaml
 touch $folder/bag.mcap $folder/heldout.mcap
 calls=$(cat $folder/../calls 2>/dev/null || echo 0)
 echo $((calls + 1)) > $folder/../calls
+[ $calls = 1 ] && exit 3
 severity=$([ $calls = 0 ] && echo 0.5 || echo 7.0)
 echo "{\"noise\": [0.1], \"changes\": {\"${3%%=*}\": {\"value\": 2.0, \"before\": 1.0, \"severity\": $severity, \"chi2_per_residual\": 3.0}}}"
 "#;
@@ -335,7 +343,7 @@ echo "{\"noise\": [0.1], \"changes\": {\"${3%%=*}\": {\"value\": 2.0, \"before\"
         fs::create_dir(&case).unwrap();
         let random = &mut ChaCha8Rng::seed_from_u64(3);
         let label = pair(&settings, "case".to_owned(), &planned, 20.0, &case, random).unwrap();
-        assert_eq!(fs::read_to_string(folder.path().join("calls")).unwrap().trim(), "2");
+        assert_eq!(fs::read_to_string(folder.path().join("calls")).unwrap().trim(), "3");
         let effect = &label.effects[0];
         assert_eq!((effect.oracle.unwrap().severity, label.kind), (7.0, Kind::Single));
         let key = effect.parameters.keys().next().unwrap();

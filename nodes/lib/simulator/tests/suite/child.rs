@@ -52,6 +52,17 @@ fn a_forward_speed_is_imposed_and_kicks_are_added() {
 }
 
 #[test]
+fn what_python_cannot_divide_is_not_finite_and_ends_nothing() {
+    let simulator = Simulator::start(&bicycle("sound", "processes: 1")).unwrap();
+    // The first stretch is begun standing still.
+    let mut batch = batch(&[40.0]);
+    batch.motions[[0, 0, 0]] = 0.0;
+    let seen = simulator.rollout(&batch).unwrap();
+    assert!(seen[[0, 0, 2]] == 0.0 && (1..30).all(|k| seen[[0, k, 2]].is_nan()));
+    assert!((30..=STEPS).all(|k| seen[[0, k, 2]].is_finite()) && seen[[0, 40, 2]] > 0.0);
+}
+
+#[test]
 fn what_is_wrong_is_said_in_time() {
     let start = Instant::now();
     for (how, says) in [
