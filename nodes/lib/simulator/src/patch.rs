@@ -192,8 +192,8 @@ mod tests {
         let mut description = crate::test_car::TestCar::new().description().clone();
         description.parameters =
             vec![serde_json::from_str(&parameter(r#""key": ["left.b", "right.b"]"#)).unwrap()];
-        let found = patch(&file, &description, &[("stiffness".to_owned(), 7.0)]).unwrap().unwrap();
-        assert_eq!(found.text, "left: {b: 7.0}\nright: {b: 7.0}\n");
+        let found = patch(&file, &description, &[("stiffness".to_owned(), 7.5)]).unwrap().unwrap();
+        assert_eq!(found.text, "left: {b: 7.5}\nright: {b: 7.5}\n");
         assert!(found.by_hand.is_empty() && found.changed.len() == 1);
     }
 

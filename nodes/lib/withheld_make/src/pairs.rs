@@ -349,7 +349,8 @@ echo "{\"noise\": [0.1], \"changes\": {\"${3%%=*}\": {\"value\": 2.0, \"before\"
         let key = effect.parameters.keys().next().unwrap();
         for file in fs::read_dir(&case).unwrap() {
             let text = fs::read_to_string(file.unwrap().path()).unwrap();
-            assert!(!text.contains(key.as_str()), "{text}");
+            let is_word = |c: char| c.is_alphanumeric() || matches!(c, '_' | '.');
+            assert!(text.split(|c| !is_word(c)).all(|word| word != key), "{text}");
         }
         let failing = SimulatorPairs { python: "/bin/false".into(), ..settings };
         let error = pair(&failing, "case".to_owned(), &planned, 20.0, &case, random).unwrap_err();
