@@ -211,11 +211,15 @@ def severities(drive, copy, changes):
     bare = drive.shown(copy(None))
     flat = lambda a: a.reshape(len(a), -1)
     starts = [flat(drive.shown(copy(None), {n: 0.02}) - bare) for n in ("v_y_mps", "yaw_rate_radps")]
-    columns = [flat(bare - drive.shown(copy(name))) for name in changes]
-    flat_columns = less_starts(columns, starts)
-    information = flat_columns @ flat_columns.T
-    own = 1.0 / np.maximum(np.diag(np.linalg.pinv(information)), 1e-300)
-    return {name: (math.sqrt(max(v, 0.0)) / DETECTION, v / flat_columns.shape[1]) for name, v in zip(changes, own)}
+    columns = less_starts([flat(bare - drive.shown(copy(name))) for name in changes], starts)
+    out = {}
+    for j, name in enumerate(changes):
+        # Of two changes that only their product shows of, nothing is left: no pseudoinverse, which would share it between them.
+        others = np.delete(columns, j, axis=0).T
+        left = columns[j] - (others @ np.linalg.lstsq(others, columns[j], rcond=1e-6)[0] if others.size else 0.0)
+        own = float(left @ left)
+        out[name] = (math.sqrt(own) / DETECTION, own / len(left))
+    return out
 
 
 def record(out, kind, asked, seed, duration_s, checkout, smooth=False, pace=0.75, car_kind=None):
