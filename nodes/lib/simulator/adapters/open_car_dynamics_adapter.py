@@ -117,8 +117,10 @@ class OpenCarDynamics(Library):
         if name.startswith("cog.") and wheelbase_m:
             # Between the axles.
             low, high = min(value, 0.2 * wheelbase_m), max(value, 0.8 * wheelbase_m)
-        # The tire of an axle stands in the file once a wheel.
-        self.parameters.append(dict(name=name, value=value, low=low, high=high, unit=unit, site=site, key=changed))
+        # The tire of an axle stands in the file once a wheel: a patch of one value, where both have the same.
+        is_one = all(values[n] == values[changed[0]] for n in changed)
+        where = {"key": changed} if is_one else {"in_code": " and ".join(changed) + " of the parameter file"}
+        self.parameters.append(dict(name=name, value=value, low=low, high=high, unit=unit, site=site, **where))
         self.changes.append(changed)
 
     def _pass(self, batch, b):

@@ -341,7 +341,7 @@ echo "{\"noise\": [0.1], \"changes\": {\"${3%%=*}\": {\"value\": 2.0, \"before\"
             Planned { family: Family::Simulator, kind: Kind::Single, effects: Vec::new(), source: 1 };
         let case = folder.path().join("case");
         fs::create_dir(&case).unwrap();
-        let random = &mut ChaCha8Rng::seed_from_u64(3);
+        let random = &mut ChaCha8Rng::seed_from_u64(5);
         let label = pair(&settings, "case".to_owned(), &planned, 20.0, &case, random).unwrap();
         assert_eq!(fs::read_to_string(folder.path().join("calls")).unwrap().trim(), "3");
         let effect = &label.effects[0];
@@ -349,8 +349,7 @@ echo "{\"noise\": [0.1], \"changes\": {\"${3%%=*}\": {\"value\": 2.0, \"before\"
         let key = effect.parameters.keys().next().unwrap();
         for file in fs::read_dir(&case).unwrap() {
             let text = fs::read_to_string(file.unwrap().path()).unwrap();
-            let is_word = |c: char| c.is_alphanumeric() || matches!(c, '_' | '.');
-            assert!(text.split(|c| !is_word(c)).all(|word| word != key), "{text}");
+            assert!(!text.contains(key.as_str()), "{text}");
         }
         let failing = SimulatorPairs { python: "/bin/false".into(), ..settings };
         let error = pair(&failing, "case".to_owned(), &planned, 20.0, &case, random).unwrap_err();
