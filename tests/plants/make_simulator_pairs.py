@@ -14,6 +14,9 @@ Detection limit: copies of the car with and without a change are put onto the re
 show over the noise, less what other start states and the other change imitate, is five standard errors at the limit. Of a car of another
 kind `excess` is what no parameter of the simulator, effect around it or start imitates: squared, over the noise, per residual.
 
+The other drive judges what was found. Where the car itself, put down beside its motion by no more than the noise, ends half a second later
+further off than GROWTH times that (near a spin), no simulator is right or wrong: it is driven anew, slower.
+
 Packages: nodes/lib/reference_car/compare/requirements.txt, and numba for f1tenth_gym (a user's checkout, --checkout).
 """
 
@@ -35,6 +38,7 @@ NO_DRIVE = 3
 AROUND = {"delay_s": 0.0, "gain": 0.0, "offset_rad": 0.0, "x_m": 0.0, "scale": 0.0}
 WINDOW = 50
 DETECTION = 5.0
+GROWTH = 10.0
 
 
 def build(kind, checkout):
@@ -175,6 +179,12 @@ class Drive:
         count = len(rows) // WINDOW * WINDOW
         return np.array(rows[:count]).reshape(-1, WINDOW, 2) / self.noise[1:]
 
+    def growth(self, copy):
+        """How far a copy that starts off by the noise gets off the motion in a window, over the noise; the most of all windows."""
+        bare = self.shown(copy())
+        off = [self.shown(copy(), {n: s}) - bare for n, s in zip(("v_y_mps", "yaw_rate_radps"), self.noise[1:])]
+        return float(np.abs(np.nan_to_num(off, nan=np.inf)).max())
+
 
 def less_starts(columns, starts):
     """Each window of each column without what another start of it imitates."""
@@ -249,7 +259,9 @@ def record(out, kind, asked, seed, duration_s, checkout, smooth=False, pace=0.75
     rng = np.random.default_rng(seed)
     geometry = (wheelbase_m, mu, top_mps)
     drive = Drive(out / "bag.mcap", lambda v: copy(None, v), geometry, rng, duration_s, smooth, pace * rng.uniform(0.8, 1.1))
-    Drive(out / "heldout.mcap", lambda v: copy(None, v), geometry, rng, duration_s, smooth, pace * rng.uniform(0.8, 1.1))
+    other = Drive(out / "heldout.mcap", lambda v: copy(None, v), geometry, rng, duration_s, smooth, pace * rng.uniform(0.8, 1.1))
+    if other.growth(copy) > GROWTH:
+        raise RuntimeError("the other drive cannot be told half a second ahead")
     severity = severities(drive, copy, changes) if changes else {}
     excess = None
     if car_kind and car_kind != kind:

@@ -66,8 +66,7 @@ pub fn diagnose(
     let layout = &fitter.layout;
     let scored = Scored::new(layout, model.free.len());
     let null = window_squares(layout, &found.null.projected);
-    let steps: Vec<Vec<f64>> =
-        found.fits.iter().map(|f| window_squares(layout, &f.state.projected)).collect();
+    let steps: Vec<Vec<f64>> = found.steps.iter().map(|s| window_squares(layout, &s.projected)).collect();
     let after = steps.last().unwrap_or(&null);
     let error = |m: &[f64]| scored.estimate(&[m], |e| e[0]);
     let ceiling = error(&flexible.all);
@@ -90,7 +89,7 @@ pub fn diagnose(
     let named_close = closed(&null, after);
     let verdict = match () {
         () if is_missing => Verdict::MissingStructure,
-        () if !found.fits.is_empty() => Verdict::Effects,
+        () if found.fit.is_some() => Verdict::Effects,
         // A few blocks hold all of it: something happened there, which need not be the simulator's.
         () if as_it_came > NO_GAP * floor => Verdict::NoneOfThese,
         () => Verdict::NoGap,
@@ -117,7 +116,7 @@ pub fn diagnose(
     }
     reasons.push(if imposed { Reason::SpeedImposed } else { Reason::SpeedSimulated });
     let state = found.state();
-    let own_changes = found.fits.last().map(|f| f.sizes.as_slice()).unwrap_or_default();
+    let own_changes = found.fit.as_ref().map(|f| f.sizes.as_slice()).unwrap_or_default();
     // Parameters that stand in for a term do so on this drive: they are written down where they are most of the answer.
     let is_mended = names_effects && (!is_missing || named_close.low > 0.5);
     let changes = own_changes.iter().filter_map(|s| match list[s.candidate].kind {
@@ -229,12 +228,11 @@ fn effects(
     accepted: bool,
     closed: &dyn Fn(usize) -> Estimate,
 ) -> Vec<RankedEffect> {
-    let sizes = found.fits.last().map(|f| f.sizes.clone()).unwrap_or_default();
+    let sizes = found.fit.as_ref().map(|f| f.sizes.clone()).unwrap_or_default();
     let mut out: Vec<RankedEffect> = Vec::new();
     for (k, size) in sizes.iter().enumerate() {
         let c = &list[size.candidate];
-        let round = &found.rounds[k];
-        let alike = round.confused.iter().map(|&o| list[o].name.clone()).collect::<Vec<_>>();
+        let alike = names(list, found.confused.get(k));
         out.push(RankedEffect {
             name: c.name.clone(),
             accepted,
@@ -248,20 +246,19 @@ fn effects(
     }
     // What was looked at last and not taken.
     let unknown = Estimate { value: f64::NAN, low: f64::NAN, high: f64::NAN };
-    if let Some(round) = found.rounds.get(sizes.len()) {
-        for (other, _) in round.compared.iter().take(3) {
-            let c = &list[*other];
-            out.push(RankedEffect {
-                name: c.name.clone(),
-                accepted: false,
-                parameters: BTreeMap::new(),
-                gap_closed_fraction: unknown,
-                confidence: 0.0,
-                confused_with: Vec::new(),
-                site: c.site.clone(),
-                unit_error: None,
-            });
-        }
+    let others = found.compared.iter().filter(|(c, _)| !sizes.iter().any(|s| s.candidate == *c));
+    for (other, _) in others.take(3) {
+        let c = &list[*other];
+        out.push(RankedEffect {
+            name: c.name.clone(),
+            accepted: false,
+            parameters: BTreeMap::new(),
+            gap_closed_fraction: unknown,
+            confidence: 0.0,
+            confused_with: Vec::new(),
+            site: c.site.clone(),
+            unit_error: None,
+        });
     }
     out
 }
@@ -293,14 +290,17 @@ fn unit_error(c: &Candidate, low: f64, high: f64, file: &SimulatorFile) -> Optio
         .map(|(name, ratio)| UnitError { name, ratio })
 }
 
+fn names(list: &[Candidate], of: Option<&Vec<usize>>) -> Vec<String> {
+    of.into_iter().flatten().map(|&c| list[c].name.clone()).collect()
+}
+
 fn taken(list: &[Candidate], found: &Found) -> Vec<Reason> {
     let mut out = Vec::new();
-    for (fit, round) in found.fits.iter().zip(&found.rounds) {
-        let Some(size) = fit.sizes.last() else { continue };
+    for (k, size) in found.fit.iter().flat_map(|f| &f.sizes).enumerate() {
         let name = list[size.candidate].name.clone();
         out.push(Reason::Taken { name: name.clone(), wald: size.wald, needed: size.needed });
-        if !round.confused.is_empty() {
-            let with = round.confused.iter().map(|&c| list[c].name.clone()).collect();
+        let with = names(list, found.confused.get(k));
+        if !with.is_empty() {
             out.push(Reason::Confused { name, with });
         }
     }

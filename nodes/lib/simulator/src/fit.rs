@@ -30,9 +30,39 @@ pub(crate) struct Fitted {
 }
 
 impl Fitted {
-    /// Whether the candidate fitted last is there: its size over its standard error is more than chance gives.
-    pub(crate) fn is_evident(&self) -> bool {
-        self.sizes.last().is_some_and(|s| s.wald > s.needed)
+    /// By how much the candidate fitted last is there beyond chance: its size over its standard error, squared, less what that must exceed.
+    pub(crate) fn last_margin(&self) -> f64 {
+        self.sizes.last().map_or(f64::NEG_INFINITY, Size::margin)
+    }
+
+    /// The same of the least evident one.
+    pub(crate) fn least_margin(&self) -> f64 {
+        self.sizes.iter().map(Size::margin).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The candidates, in their order.
+    pub(crate) fn members(&self) -> Vec<usize> {
+        self.sizes.iter().map(|s| s.candidate).collect()
+    }
+
+    /// Whether these are the candidates, in whatever order.
+    pub(crate) fn has_same_members(&self, others: &[usize]) -> bool {
+        self.sizes.len() == others.len() && self.sizes.iter().all(|s| others.contains(&s.candidate))
+    }
+
+    /// The same fit, its clearest candidate first.
+    pub(crate) fn largest_first(mut self) -> Self {
+        let mut both: Vec<(Size, Residuals)> = self.sizes.into_iter().zip(self.columns).collect();
+        both.sort_by(|a, b| b.0.wald.total_cmp(&a.0.wald));
+        (self.sizes, self.columns) = both.into_iter().unzip();
+        self
+    }
+
+    /// The place of the least evident of those that are not evident.
+    pub(crate) fn least_evident(&self) -> Option<usize> {
+        let share = |s: &Size| s.wald / s.needed;
+        let places = (0..self.sizes.len()).filter(|&k| share(&self.sizes[k]) <= 1.0);
+        places.min_by(|&a, &b| share(&self.sizes[a]).total_cmp(&share(&self.sizes[b])))
     }
 }
 
@@ -47,6 +77,12 @@ pub(crate) struct Size {
     pub(crate) wald: f64,
     /// What that must exceed.
     pub(crate) needed: f64,
+}
+
+impl Size {
+    fn margin(&self) -> f64 {
+        self.wald - self.needed
+    }
 }
 
 /// Chance, at each side, that a recording of a car that is as the simulator gets anything named.

@@ -4,6 +4,7 @@ use crate::SimulatorError;
 use crate::fit::{Fitter, State};
 use crate::linear::Normal;
 use crate::model::Residuals;
+use crate::round::Likely;
 
 /// Rollouts that following a candidate takes at most.
 pub(crate) const LOOKS: usize = 3;
@@ -63,52 +64,57 @@ impl Fitter<'_> {
 
     /// Looks further where a small change shows nothing, such as at a limit that is not reached: by candidate the best of a few values
     /// between here and its bounds, with what it gains; and the candidates that show nothing there, either.
-    #[allow(clippy::type_complexity, reason = "two lists")]
     pub(crate) fn scan(
         &self,
         state: &State,
         silent: &[usize],
-    ) -> Result<(Vec<(usize, f64, Vec<f64>)>, Vec<usize>), SimulatorError> {
+    ) -> Result<(Vec<Likely>, Vec<usize>), SimulatorError> {
         /// Shares of the way to the lower and to the upper bound: scales are positive, and their small values lie close together. First
         /// where most shows; the others only of candidates that show something there.
         const FIRST: [f64; 2] = [-0.95, 0.5];
         const THEN: [f64; 5] = [-0.9, -0.8, -0.5, 0.05, 0.2];
         let layout = &self.layout;
         let before = state.training(layout);
-        let mut best: Vec<(usize, f64, Vec<f64>)> = Vec::new();
-        let (mut looked, mut shown) = (silent.to_vec(), Vec::new());
+        let bound = |c: usize, share: f64| {
+            let candidate = &self.model.candidates[c];
+            if share < 0.0 { candidate.low } else { candidate.high }
+        };
+        // By candidate: shares of the ways to its bounds, with what the simulator says there.
+        let mut looks: Vec<(usize, Vec<(f64, State)>)> = silent.iter().map(|&c| (c, Vec::new())).collect();
+        let mut looked = silent.to_vec();
         for shares in [FIRST.as_slice(), &THEN] {
-            let mut values: Vec<(usize, Vec<f64>)> = Vec::new();
-            for &c in &looked {
-                let (candidate, here) = (&self.model.candidates[c], state.point.values[c]);
-                for share in shares {
-                    let bound = if *share < 0.0 { candidate.low } else { candidate.high };
-                    let value = here + share.abs() * (bound - here);
-                    let mut other = state.point.values.clone();
-                    other[c] = if candidate.integer { value.round() } else { value };
-                    values.push((c, other));
+            let mut places: Vec<(usize, f64, Vec<f64>)> = Vec::new();
+            for (&c, &share) in looked.iter().flat_map(|c| shares.iter().map(move |share| (c, share))) {
+                let here = state.point.values[c];
+                let value = here + share.abs() * (bound(c, share) - here);
+                let mut values = state.point.values.clone();
+                values[c] = if self.model.candidates[c].integer { value.round() } else { value };
+                if values[c] != here {
+                    places.push((c, share, values));
                 }
             }
-            values.retain(|(c, v)| v[*c] != state.point.values[*c]);
-            if values.is_empty() {
-                break;
-            }
-            let points: Vec<Vec<f64>> = values.iter().map(|v| v.1.clone()).collect();
-            let trials = self.still(state, &points)?;
-            let seen = |trial: &State| trial.residuals != state.residuals;
-            looked = values.iter().zip(&trials).filter(|(_, t)| seen(t)).map(|((c, _), _)| *c).collect();
-            looked.dedup();
-            shown.extend(&looked);
-            for ((c, values), trial) in values.into_iter().zip(trials) {
-                let gain = before - trial.training(layout);
-                match best.iter().position(|b| b.0 == c) {
-                    Some(p) if best[p].1 < gain => best[p] = (c, gain, values),
-                    None if gain > 0.0 => best.push((c, gain, values)),
-                    _ => {}
+            let points: Vec<Vec<f64>> = places.iter().map(|p| p.2.clone()).collect();
+            let trials = if points.is_empty() { Vec::new() } else { self.still(state, &points)? };
+            for ((c, share, _), trial) in places.into_iter().zip(trials) {
+                if let Some((_, looks)) = looks.iter_mut().find(|l| l.0 == c) {
+                    looks.push((share, trial));
                 }
             }
+            let shows = |looks: &[(f64, State)]| looks.iter().any(|(_, s)| s.residuals != state.residuals);
+            looked = looks.iter().filter(|(_, l)| shows(l)).map(|(c, _)| *c).collect();
         }
-        Ok((best, silent.iter().copied().filter(|c| !shown.contains(c)).collect()))
+        let mute = silent.iter().copied().filter(|c| !looked.contains(c)).collect();
+        let best = |looks: &[(f64, State)]| {
+            let states = looks.iter().map(|(_, s)| s);
+            states.min_by(|a, b| a.training(layout).total_cmp(&b.training(layout))).cloned()
+        };
+        let likely = looks.iter().filter_map(|(candidate, looks)| {
+            let best = best(looks)?;
+            let gain = before - best.training(layout);
+            (gain > 0.0).then_some(Likely { candidate: *candidate, gain, values: best.point.values })
+        });
+        let likely = likely.collect();
+        Ok((likely, mute))
     }
 
     /// Follows each candidate along its own line: where the line of two points has its least, there is the next.
@@ -116,12 +122,12 @@ impl Fitter<'_> {
         &self,
         state: &State,
         columns: &[Residuals],
-        likely: &[(usize, f64, Vec<f64>)],
+        likely: &[Likely],
     ) -> Result<Vec<(usize, State)>, SimulatorError> {
         let layout = &self.layout;
         let all: Vec<(usize, &Residuals)> = columns.iter().enumerate().collect();
-        let along = |(_, _, end): &(usize, f64, Vec<f64>), share: f64| -> Vec<f64> {
-            let line = state.point.values.iter().zip(end).enumerate();
+        let along = |likely: &Likely, share: f64| -> Vec<f64> {
+            let line = state.point.values.iter().zip(&likely.values).enumerate();
             line.map(|(k, (from, to))| self.within(k, from + share * (to - from))).collect()
         };
         // By candidate: shares of the line looked at, with what the simulator said.
@@ -144,9 +150,9 @@ impl Fitter<'_> {
         let mut best: Vec<(usize, State)> = likely
             .iter()
             .zip(looked)
-            .filter_map(|((c, _, _), looks)| {
+            .filter_map(|(l, looks)| {
                 let (share, state) = looks.into_iter().next()?;
-                (share != 0.0).then_some((*c, state))
+                (share != 0.0).then_some((l.candidate, state))
             })
             .collect();
         best.sort_by(|a, b| a.1.training(layout).total_cmp(&b.1.training(layout)));

@@ -18,6 +18,8 @@ pub(crate) struct TestCar {
     passes: AtomicUsize,
     /// Relaxation length of the tires: something the simulator has no parameter for.
     pub(crate) relaxation_m: f64,
+    /// Whether tires follow a straight line up to their grip: it shows where it is reached, and nowhere else.
+    pub(crate) clips: bool,
     /// What the car makes of a commanded angle.
     pub(crate) steering_gain: f64,
 }
@@ -52,7 +54,7 @@ impl TestCar {
             imposes_v_x: true,
             lacks: vec!["tire relaxation".to_owned()],
         };
-        Self { description, passes: AtomicUsize::new(0), relaxation_m: 0.0, steering_gain: 1.0 }
+        Self { description, passes: AtomicUsize::new(0), relaxation_m: 0.0, clips: false, steering_gain: 1.0 }
     }
 
     fn pass(&self, batch: &Batch, b: usize) -> Vec<[f64; 3]> {
@@ -82,7 +84,8 @@ impl TestCar {
             let asked = buffer.pop().unwrap_or(0.0);
             angle += (asked - angle).clamp(-p[5] * 0.01, p[5] * 0.01);
             let [v, v_y, r] = x;
-            let tire = |c: f64, slip: f64| p[2] * (c * slip / p[2]).tanh() / 2.0;
+            let share = |s: f64| if self.clips { s.clamp(-1.0, 1.0) } else { s.tanh() };
+            let tire = |c: f64, slip: f64| p[2] * share(c * slip / p[2]) / 2.0;
             let steady = [tire(p[0], angle - (v_y + 0.16 * r) / v), tire(p[1], -(v_y - 0.16 * r) / v)];
             for (f, s) in forces.iter_mut().zip(steady) {
                 let share =

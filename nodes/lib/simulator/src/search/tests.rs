@@ -6,15 +6,18 @@ use crate::{Channel, Drive, Model, Roll as _, SimulatorFile, candidates};
 type Named = (String, f64, f64, f64);
 
 fn found(changed: &[(usize, f64)], seed: u64) -> (Vec<Named>, usize, f64) {
-    let car = TestCar::new();
+    found_in(&TestCar::new(), changed, seed)
+}
+
+fn found_in(car: &TestCar, changed: &[(usize, f64)], seed: u64) -> (Vec<Named>, usize, f64) {
     let (sequence, commands) = car.recorded(changed, 40.0, seed);
     let file = SimulatorFile::parse("command: [none]", std::env::temp_dir().as_path()).unwrap();
     let drive = Drive::new(&sequence, commands, &[Channel::VYMps, Channel::YawRateRadps]).unwrap();
     let list = candidates(car.description(), &file, &drive.channels, true, &[]);
-    let model = Model::new(&car, &file, &drive, &list, true);
+    let model = Model::new(car, &file, &drive, &list, true);
     let fitter = Fitter::new(&model);
     let found = fitter.search(&mut |_| ()).unwrap();
-    let sizes = found.fits.last().map(|f| f.sizes.clone()).unwrap_or_default();
+    let sizes = found.fit.as_ref().map(|f| f.sizes.clone()).unwrap_or_default();
     let named = sizes.iter().map(|s| (list[s.candidate].name.clone(), s.value, s.low, s.high)).collect();
     let left = found.state().held_out(&fitter.layout);
     (named, car.passes(), left)
@@ -35,6 +38,18 @@ fn one_change_is_found_with_its_size() {
             assert!((named[0].1 - value).abs() < 0.03 * value && left.is_finite(), "{named:?} {left}");
             assert!(passes < 300, "{passes}");
         }
+    }
+}
+
+#[test]
+fn a_grip_that_shows_only_where_it_is_reached_is_found() {
+    let mut car = TestCar::new();
+    car.clips = true;
+    for (grip, seed) in [(4.0, 1), (5.0, 2), (6.0, 3)] {
+        let (named, passes, _) = found_in(&car, &[(2, grip)], seed);
+        assert_eq!(named.len(), 1, "{grip} {seed}: {named:?}");
+        assert!(named[0].0 == "simulator.grip" && (named[0].1 - grip).abs() < 0.01 * grip, "{named:?}");
+        assert!(passes < 300, "{passes}");
     }
 }
 
@@ -70,4 +85,10 @@ fn a_fit_that_is_stopped_on_its_way_says_so_and_goes_on() {
     let on = fitter.fit(&stopped.state, &[grip], stopped.columns.clone(), STEPS).unwrap();
     assert!(on.is_settled && (on.sizes[0].value - 6.0).abs() < 0.1, "{:?}", on.sizes);
     assert!(on.state.training(&fitter.layout) < stopped.state.training(&fitter.layout));
+}
+
+#[test]
+fn held_out_windows_that_lose_count_against_a_name_and_a_clear_loss_forbids_it() {
+    assert!(stands(1.0, 5.0) && stands(1.0, -0.5) && stands(1000.0, -5.0));
+    assert!(!stands(-1.0, 50.0) && !stands(1.0, -1.5) && !stands(1000.0, -7.0));
 }
