@@ -52,14 +52,17 @@ impl Fitter<'_> {
         for (k, (c, trial)) in followed.iter().enumerate() {
             // Where even the best gains less than its name costs, nothing is fitted.
             let is_worth_it = before - trial.training(layout) >= 0.5 * self.needed();
-            if is_worth_it && (k < FITTED || k < FITTED_IF_UNEXPLAINED && least(&fits) > unexplained) {
+            let is_one_more = k < FITTED_IF_UNEXPLAINED
+                && least(&fits) > unexplained
+                && self.rollouts() + FIT <= MOST_ROLLOUTS;
+            if is_worth_it && (k < FITTED || is_one_more) {
                 fits.push(self.with(&ahead, *c, trial)?);
             }
         }
         let left = least(&fits);
         if !found.zoomed
             && left > unexplained.max(SLOW * before)
-            && self.rollouts() + self.zooming() <= MOST_ROLLOUTS
+            && self.rollouts() + self.zooming() + FIT <= MOST_ROLLOUTS
         {
             found.zoomed = true;
             if let Some((c, trial)) = self.zoom(&ahead.state, &ahead.active)? {

@@ -43,9 +43,9 @@ fn one_change_is_found_with_its_size() {
 
 #[test]
 fn a_grip_that_shows_only_where_it_is_reached_is_found() {
-    let mut car = TestCar::new();
-    car.clips = true;
     for (grip, seed) in [(4.0, 1), (5.0, 2), (6.0, 3)] {
+        let mut car = TestCar::new();
+        car.clips = true;
         let (named, passes, _) = found_in(&car, &[(2, grip)], seed);
         assert_eq!(named.len(), 1, "{grip} {seed}: {named:?}");
         assert!(named[0].0 == "simulator.grip" && (named[0].1 - grip).abs() < 0.01 * grip, "{named:?}");
