@@ -79,7 +79,7 @@ impl Role {
 /// Where streams and signals come from, as a topics file says.
 ///
 /// A stream is a topic of the type that it needs (`odom: /car_state/odom`), or of another known type (Autoware's, a stamped twist); one without
-/// an entry is found by its type, and an empty name leaves it out. A signal is any field of any message
+/// an entry is found by its type, or as the only one of another known type, and an empty name leaves it out. A signal is any field of any message
 /// (`steering: {topic: /commands/servo/position, field: data, gain: -1.2135, offset: 0.5304}`, see [`Mapping`]), and goes before the stream
 /// that it belongs to. `pose: /tracked_pose` is short for its three signals; `pose: {topic: /tracked_pose, ahead_m: -0.16}` says that its point is not
 /// the centre of gravity.
@@ -260,6 +260,9 @@ impl TopicMap {
                 // A localisation alone may do; odometry beside it is taken.
                 None if located => find(bag, None, role, false, self.pose.as_deref())?,
                 Some(topic) if !topic.is_empty() && expand(bag, role, topic, &mut signals) => None,
+                None if of_another_type(bag, role).is_some_and(|t| expand(bag, role, t, &mut signals)) => {
+                    None
+                }
                 wanted => find(bag, wanted, role, role.needed(), None)?,
             };
         }
@@ -302,19 +305,37 @@ fn unknown(name: &str) -> String {
 
 /// Takes the signals of a topic of another known type than the stream's own; `false` where it is of the stream's own, or not known.
 fn expand(bag: &Bag, role: Role, topic: &str, signals: &mut BTreeMap<Signal, Mapping>) -> bool {
-    let group = match role {
-        Role::Odom => Group::Motion,
-        Role::Drive => Group::Command,
-        Role::Imu => Group::Imu,
-        Role::Wheels => Group::Wheels,
-    };
     let Some(found) = bag.topics().iter().find(|t| t.name == topic) else { return false };
+    let group = group_of(role);
     if found.type_name == role.type_name() {
         return false;
     }
     let fields = fields_of(&found.type_name, group);
     signals.extend(fields.iter().map(|&(signal, _)| (signal, Mapping::of_topic(topic))));
     !fields.is_empty()
+}
+
+fn group_of(role: Role) -> Group {
+    match role {
+        Role::Odom => Group::Motion,
+        Role::Drive => Group::Command,
+        Role::Imu => Group::Imu,
+        Role::Wheels => Group::Wheels,
+    }
+}
+
+/// The topic that a needed stream is taken from where a bag has none of the stream's own type, and one of another known one.
+fn of_another_type(bag: &Bag, role: Role) -> Option<&str> {
+    if !role.needed() || bag.topics().iter().any(|t| recorded(t, role.type_name())) {
+        return None;
+    }
+    let is_known =
+        |t: &&Topic| !t.name.starts_with(OWN_PREFIX) && !fields_of(&t.type_name, group_of(role)).is_empty();
+    let mut known = bag.topics().iter().filter(is_known);
+    match (known.next(), known.next()) {
+        (Some(only), None) => Some(&only.name),
+        _ => None,
+    }
 }
 
 /// The topics that a bag's streams were found under.

@@ -1,15 +1,15 @@
 //! State sequences over messages, in chunks, and out of bags.
 
 use gripsight_bag::{
-    BagError, BagWriter, CHUNK_LIMIT_BYTES, Reassembler, TopicMap, read_recorded_sequences, read_sequences,
-    sequence_to_messages, to_cdr,
+    Bag, BagError, BagWriter, CHUNK_LIMIT_BYTES, Reassembler, Role, TopicMap, read_recorded_sequences,
+    read_sequences, sequence_to_messages, to_cdr,
 };
 use gripsight_msgs::Handshake;
-use gripsight_signals::{Clock, Kind, StateSequence, WindowConfig};
+use gripsight_signals::{Clock, Kind, Signal, StateSequence, WindowConfig};
 use proptest::prelude::*;
 use tempfile::TempDir;
 
-use crate::support::{START_NS, WHOLE, telemetry_bag};
+use crate::support::{Channel, START_NS, WHOLE, file, mcap_bytes, telemetry_bag};
 
 /// A sequence of `len` samples with every channel its own, some of them not recorded.
 fn sequence(len: usize, recorded: bool) -> StateSequence {
@@ -114,4 +114,30 @@ fn recorded_sequences_come_back_bit_for_bit() {
     assert!(
         recorded.iter().all(|r| r.handshake.seed == 3 && r.handshake.sequence_id == r.sequence.sequence_id)
     );
+}
+
+#[test]
+fn a_command_of_another_known_type_is_found_where_it_is_the_only_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let autoware = |topic| Channel {
+        topic,
+        type_name: "autoware_control_msgs/msg/Control",
+        encoding: "cdr",
+        data: Vec::new(),
+    };
+    let resolve = |channels: &[Channel]| {
+        let path = file(&folder, &mcap_bytes("ros2", mcap::WriteOptions::new(), channels));
+        TopicMap::default().resolve(&Bag::open(&path).unwrap())
+    };
+    let streams = resolve(&[Channel::odom(), autoware("/control/command/control_cmd")]).unwrap();
+    assert_eq!(streams.topic(Role::Odom), Some("/odom"));
+    assert_eq!(streams.topic(Role::Drive), None);
+    let mapped = &streams.mapped()[0];
+    assert_eq!(mapped.topic, "/control/command/control_cmd");
+    assert!(mapped.signals.iter().any(|(signal, _)| *signal == Signal::Steering), "{:?}", mapped.signals);
+    // Beside the stream's own type it is left alone; of two nobody knows which.
+    let streams = resolve(&[Channel::odom(), Channel::drive(), autoware("/control_cmd")]).unwrap();
+    assert!(streams.topic(Role::Drive) == Some("/drive") && streams.mapped().is_empty());
+    let error = resolve(&[Channel::odom(), autoware("/a"), autoware("/b")]).unwrap_err();
+    assert!(matches!(error, BagError::MissingTopic { role: "drive", .. }), "{error}");
 }
