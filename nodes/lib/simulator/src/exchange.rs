@@ -115,7 +115,14 @@ impl Fitter<'_> {
         enough: f64,
     ) -> Vec<Set> {
         let mut out: Vec<Set> = Vec::new();
-        for set in self.sets(state, columns, active, most) {
+        let name = (state.training(&self.layout) / self.residuals()).max(1.0) * self.needed();
+        let gained = |set: &Set| state.training(&self.layout) - set.cost;
+        // Sets of more candidates must gain what their names cost; others may be as good.
+        let is_worth_it = |set: &Set| match set.members.len().checked_sub(active.len()) {
+            Some(more @ 1..) => gained(set) > more as f64 * name,
+            _ => true,
+        };
+        for set in self.sets(state, columns, active, most).into_iter().filter(is_worth_it) {
             // What a set gains over one that is in it is less than its name costs: the smaller one came first.
             let is_more = out.iter().any(|s| s.members.iter().all(|c| set.members.contains(c)));
             if out.len() < FITTED && !is_more && set.cost < enough {

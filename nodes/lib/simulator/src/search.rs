@@ -97,7 +97,13 @@ impl Fitter<'_> {
                 }
             }
             progress("other sets of effects");
-            let most = if left > noise { size + 2 } else { size };
+            let most = if left > noise {
+                size + 2
+            } else if size > 0 {
+                size + 1
+            } else {
+                0
+            };
             if !self.exchange(&mut found, most, noise.max(UNEXPLAINED * left))? {
                 break;
             }
