@@ -72,13 +72,18 @@ impl Fitter<'_> {
         let Some(best) = fits.first().cloned() else { return Ok(false) };
         fits.retain(|f| f.sizes.len() == best.sizes.len() && self.alike(&best.state.costs, &f.state.costs));
         let is_new = worth(&best) < present && !fits.iter().any(|f| f.has_same_members(&active));
-        let own = |f: &Fitted| f.members().iter().filter(|&&c| self.model.candidates[c].is_own()).count();
-        let most_own = fits.iter().map(own).max().unwrap_or(0);
-        let chosen = fits.iter().find(|f| own(f) == most_own).cloned().unwrap_or(best);
+        let chosen = self.mendable(&fits.iter().collect::<Vec<_>>()).unwrap_or(&best).clone();
         let chosen = self.settled(chosen)?;
         found.confused = confused(&chosen, &fits);
         found.fit = Some(chosen);
         Ok(is_new)
+    }
+
+    /// Of fits that leave the same, the first of those with the most parameters of the simulator's own: they can be mended.
+    pub(crate) fn mendable<'b>(&self, alike: &[&'b Fitted]) -> Option<&'b Fitted> {
+        let own = |f: &Fitted| f.members().iter().filter(|&&c| self.model.candidates[c].is_own()).count();
+        let most = alike.iter().map(|f| own(f)).max()?;
+        alike.iter().copied().find(|f| own(f) == most)
     }
 
     /// Derivatives at the model found by what is in it and in the likeliest sets, by those that are known from elsewhere.
@@ -115,14 +120,7 @@ impl Fitter<'_> {
         enough: f64,
     ) -> Vec<Set> {
         let mut out: Vec<Set> = Vec::new();
-        let name = (state.training(&self.layout) / self.residuals()).max(1.0) * self.needed();
-        let gained = |set: &Set| state.training(&self.layout) - set.cost;
-        // Sets of more candidates must gain what their names cost; others may be as good.
-        let is_worth_it = |set: &Set| match set.members.len().checked_sub(active.len()) {
-            Some(more @ 1..) => gained(set) > more as f64 * name,
-            _ => true,
-        };
-        for set in self.sets(state, columns, active, most).into_iter().filter(is_worth_it) {
+        for set in self.sets(state, columns, active, most) {
             // What a set gains over one that is in it is less than its name costs: the smaller one came first.
             let is_more = out.iter().any(|s| s.members.iter().all(|c| set.members.contains(c)));
             if out.len() < FITTED && !is_more && set.cost < enough {
@@ -154,7 +152,13 @@ impl Fitter<'_> {
                 }
             }
         }
-        let worth = |s: &Set| s.cost + scale * self.needed() * s.members.len() as f64;
+        let name = scale * self.needed();
+        // Sets of more candidates must gain what their names cost; others may be as good.
+        out.retain(|s| {
+            let more = s.members.len().saturating_sub(active.len());
+            more == 0 || cost - s.cost > more as f64 * name
+        });
+        let worth = |s: &Set| s.cost + name * s.members.len() as f64;
         out.sort_by(|a, b| worth(a).total_cmp(&worth(b)));
         out
     }
@@ -248,6 +252,7 @@ mod tests {
             null,
             steps: Vec::new(),
             confused: Vec::new(),
+            alike: Vec::new(),
             compared: Vec::new(),
             mute: Vec::new(),
             columns,

@@ -72,7 +72,7 @@ impl Fitter<'_> {
         /// Shares of the way to the lower and to the upper bound: scales are positive, and their small values lie close together. First
         /// where most shows; the others only of candidates that show something there.
         const FIRST: [f64; 2] = [-0.95, 0.5];
-        const THEN: [f64; 12] = [-0.9, -0.85, -0.8, -0.7, -0.6, -0.5, -0.35, 0.0125, 0.025, 0.05, 0.1, 0.2];
+        const THEN: [f64; 9] = [-0.9, -0.85, -0.8, -0.7, -0.6, -0.5, -0.35, 0.05, 0.2];
         let layout = &self.layout;
         let before = state.training(layout);
         let bound = |c: usize, share: f64| {

@@ -85,10 +85,16 @@ impl Fitter<'_> {
         }
         found.compared = followed.iter().map(|(c, s)| (*c, s.training(layout))).collect();
         found.columns = ahead.columns;
-        let best =
-            fits.into_iter().min_by(|a, b| a.state.training(layout).total_cmp(&b.state.training(layout)));
-        let Some(best) = best else { return Ok(None) };
-        let best = self.settled(best)?;
+        fits.sort_by(|a, b| a.state.training(layout).total_cmp(&b.state.training(layout)));
+        let Some(best) = fits.first() else { return Ok(None) };
+        let alike: Vec<&Fitted> =
+            fits.iter().filter(|f| self.alike(&best.state.costs, &f.state.costs)).collect();
+        let chosen = self.mendable(&alike).unwrap_or(best);
+        // A limit that another one hides shows nothing once that is taken: here both are seen.
+        let last = |f: &Fitted| f.members().last().copied();
+        let others = alike.iter().filter_map(|f| Some((last(chosen)?, last(f)?)));
+        found.alike.extend(others.filter(|(chosen, other)| chosen != other));
+        let best = self.settled(chosen.clone())?;
         Ok(self.carries_over(&best, &ahead.state, best.last_margin()).then_some(best))
     }
 

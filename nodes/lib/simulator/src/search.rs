@@ -42,6 +42,8 @@ pub(crate) struct Found {
     pub(crate) steps: Vec<State>,
     /// By effect: candidates that the data cannot tell from it.
     pub(crate) confused: Vec<Vec<usize>>,
+    /// Candidates taken in a round, with others that left the same there.
+    pub(crate) alike: Vec<(usize, usize)>,
     /// The candidates that the last round followed, with the cost that each leaves beside those found, best first.
     pub(crate) compared: Vec<(usize, f64)>,
     /// Candidates that show nothing anywhere between their bounds.
@@ -76,6 +78,7 @@ impl Fitter<'_> {
             fit: None,
             steps: Vec::new(),
             confused: Vec::new(),
+            alike: Vec::new(),
             compared: Vec::new(),
             mute: Vec::new(),
             columns: Vec::new(),
@@ -112,6 +115,16 @@ impl Fitter<'_> {
             progress("what the sizes are worth");
             self.widen(&mut fit)?;
             found.steps = self.steps_on_the_way(&fit)?;
+            let members = fit.members();
+            found.confused.resize(members.len(), Vec::new());
+            for (member, confused) in members.iter().zip(&mut found.confused) {
+                let others = found.alike.iter().filter(|(taken, _)| taken == member).map(|(_, other)| *other);
+                others.filter(|c| !members.contains(c)).for_each(|c| {
+                    if !confused.contains(&c) {
+                        confused.push(c);
+                    }
+                });
+            }
             found.fit = Some(fit);
         }
         Ok(found)
