@@ -7,6 +7,8 @@
 //! A fit begins with derivatives that are known nearby and ends with such that were taken where it ends: their step, and the intervals, are
 //! as exact as if all had been.
 
+use nalgebra::DVector;
+
 use crate::SimulatorError;
 use crate::fit::{Fitted, Fitter, State};
 use crate::linear::Normal;
@@ -43,7 +45,9 @@ impl Fitter<'_> {
             }
             let before = state.training(layout);
             let normal = self.normal(&state, &columns);
-            let step = normal.step(damping).filter(|step| fresh || normal.gain(step) > TOLERANCE * before);
+            let step = self
+                .whole(&state, &normal, active, damping)
+                .filter(|step| step.amax() > 0.0 && (fresh || normal.gain(step) > TOLERANCE * before));
             let Some(step) = step else {
                 if fresh {
                     is_settled = true;
@@ -116,6 +120,22 @@ impl Fitter<'_> {
             }
         }
         columns
+    }
+
+    /// The step that lowers the cost most where counts move by whole numbers: what these cannot follow the others do.
+    fn whole(&self, state: &State, normal: &Normal, active: &[usize], damping: f64) -> Option<DVector<f64>> {
+        let step = normal.step(damping)?;
+        let is_count = |j: &usize| self.model.candidates[active[*j]].integer;
+        let (counts, others): (Vec<usize>, Vec<usize>) = (0..active.len()).partition(is_count);
+        let mut out = step;
+        for &j in &counts {
+            let value = state.point.values[active[j]];
+            out[j] = self.within(active[j], value + out[j]) - value;
+        }
+        if counts.is_empty() || others.is_empty() {
+            return Some(out);
+        }
+        normal.follow(&mut out, &others, damping).then_some(out)
     }
 
     fn anew(&self, state: State, active: &[usize]) -> Result<(State, Vec<Residuals>), SimulatorError> {

@@ -89,7 +89,7 @@ impl Fitter<'_> {
     /// Derivatives at the model found by what is in it and in the likeliest sets, by those that are known from elsewhere.
     fn columns_of_likely_sets(
         &self,
-        found: &Found,
+        found: &mut Found,
         most: usize,
     ) -> Result<(State, Vec<Residuals>), SimulatorError> {
         let active = found.active();
@@ -104,9 +104,10 @@ impl Fitter<'_> {
                 pool.push(c);
             }
         }
-        let (state, anew) = self.around(here.point.clone(), Some(here.residuals.clone()), &pool)?;
-        let mut columns = vec![vec![0.0; state.residuals.len()]; known.len()];
-        pool.iter().zip(anew).for_each(|(&c, column)| columns[c] = column);
+        let state = self.derivatives(found, &pool)?;
+        let taken = found.taken.as_ref().map(|(_, taken)| taken.as_slice()).unwrap_or_default();
+        let mut columns = found.columns.clone();
+        columns.iter_mut().enumerate().filter(|(c, _)| !taken.contains(c)).for_each(|(_, v)| v.fill(0.0));
         Ok((state, columns))
     }
 
@@ -130,7 +131,7 @@ impl Fitter<'_> {
         out
     }
 
-    /// Sets of candidates other than the active one and its subsets, the best by what they would leave and cost first.
+    /// Sets of candidates other than the active one, the best by what they would leave and cost first.
     fn sets(&self, state: &State, columns: &[Residuals], active: &[usize], most: usize) -> Vec<Set> {
         let layout = &self.layout;
         let among: Vec<usize> =
@@ -144,7 +145,7 @@ impl Fitter<'_> {
         for size in 1..=most.min(MOST_FOUND) {
             for picked in combinations(among.len(), size) {
                 let members: Vec<usize> = picked.iter().map(|&p| among[p]).collect();
-                if members.iter().all(|c| active.contains(c)) {
+                if members.len() == active.len() && members.iter().all(|c| active.contains(c)) {
                     continue;
                 }
                 if let Some(set) = self.set(state, &normal, &among, &picked, active) {
@@ -249,14 +250,8 @@ mod tests {
         let known = wrong.iter().map(|&c| columns[c].clone()).collect();
         let mut found = Found {
             fit: Some(fitter.fit(&null, &wrong, known, STEPS).unwrap()),
-            null,
-            steps: Vec::new(),
-            confused: Vec::new(),
-            alike: Vec::new(),
-            compared: Vec::new(),
-            mute: Vec::new(),
             columns,
-            zoomed: false,
+            ..Found::new(null)
         };
         let mut exchanges = 0;
         while fitter.exchange(&mut found, 2, f64::INFINITY).unwrap() {

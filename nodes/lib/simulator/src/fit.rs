@@ -200,27 +200,41 @@ impl<'a> Fitter<'a> {
             other.starts.iter_mut().for_each(|x| x[f] += small);
             points.push(other);
         }
-        let steps: Vec<f64> = candidates.iter().map(|&c| self.step(c, point.values[c])).collect();
-        for (&c, step) in candidates.iter().zip(&steps) {
-            let mut other = point.clone();
-            other.values[c] += step;
-            points.push(other);
-        }
+        let (steps, nudged) = self.nudged(&point, candidates);
+        points.extend(nudged);
         let mut results = model.residuals(&points)?;
         let base = known.unwrap_or_else(|| results[0].clone());
         if let Some(at) = base.iter().position(|r| !r.is_finite()) {
             return Err(self.not_finite(at));
         }
         let rest = results.split_off(ahead);
-        let derivative = |r: &Residuals, step: f64| -> Residuals {
-            r.iter().zip(&base).map(|(a, b)| if a.is_finite() { (a - b) / step } else { 0.0 }).collect()
-        };
         let count = model.free.len();
         let by_start: Vec<Residuals> =
-            rest[..count].iter().zip(&model.free).map(|(r, (_, _, small))| derivative(r, *small)).collect();
+            rest[..count].iter().zip(&model.free).map(|(r, (_, _, small))| slope(&base, r, *small)).collect();
         let starts = Starts::new(&self.layout, &by_start);
-        let columns = rest[count..].iter().zip(&steps).map(|(r, step)| derivative(r, *step)).collect();
+        let columns = rest[count..].iter().zip(&steps).map(|(r, step)| slope(&base, r, *step)).collect();
         Ok((State::new(&self.layout, point, base, starts), columns))
+    }
+
+    /// The derivatives by some candidates at a state.
+    pub(crate) fn columns_of(
+        &self,
+        state: &State,
+        candidates: &[usize],
+    ) -> Result<Vec<Residuals>, SimulatorError> {
+        let (steps, nudged) = self.nudged(&state.point, candidates);
+        let results = self.model.residuals(&nudged)?;
+        Ok(results.iter().zip(&steps).map(|(r, step)| slope(&state.residuals, r, *step)).collect())
+    }
+
+    /// By candidate: the small change that a derivative is taken over, and the point there.
+    fn nudged(&self, point: &Point, candidates: &[usize]) -> (Vec<f64>, Vec<Point>) {
+        let nudge = |&c: &usize| {
+            let (step, mut other) = (self.step(c, point.values[c]), point.clone());
+            other.values[c] += step;
+            (step, other)
+        };
+        candidates.iter().map(nudge).unzip()
     }
 
     /// The small change that a derivative is taken over: away from a bound.
@@ -288,12 +302,10 @@ impl<'a> Fitter<'a> {
             .collect())
     }
 
-    /// A value that a candidate can have. A count near a whole number is that number: between two every rollout is two.
+    /// A value that a candidate can have; of a count a whole number.
     pub(crate) fn within(&self, candidate: usize, value: f64) -> f64 {
-        const NEAR: f64 = 0.2;
         let c = &self.model.candidates[candidate];
-        let is_whole = c.integer && (value - value.round()).abs() < NEAR;
-        if is_whole { value.round() } else { value }.clamp(c.low, c.high)
+        if c.integer { value.round() } else { value }.clamp(c.low, c.high)
     }
 
     pub(crate) fn sizes(&self, state: &State, active: &[usize], columns: &[Residuals]) -> Vec<Size> {
@@ -315,4 +327,8 @@ impl<'a> Fitter<'a> {
         };
         active.iter().enumerate().map(size).collect()
     }
+}
+
+fn slope(at: &Residuals, beside: &Residuals, step: f64) -> Residuals {
+    beside.iter().zip(at).map(|(b, a)| if b.is_finite() { (b - a) / step } else { 0.0 }).collect()
 }

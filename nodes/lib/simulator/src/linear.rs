@@ -176,6 +176,22 @@ impl Normal {
         step.iter().all(|v| v.is_finite()).then_some(step)
     }
 
+    /// Lets some parameters of a step follow the others, as [`Self::step`] does all. Returns whether they can.
+    pub(crate) fn follow(&self, step: &mut DVector<f64>, which: &[usize], damping: f64) -> bool {
+        for &j in which {
+            step[j] = 0.0;
+        }
+        let slope = &self.gradient + &self.information * &*step;
+        let h = DMatrix::from_fn(which.len(), which.len(), |a, b| {
+            let own = if a == b { damping * self.information[(which[a], which[a])] + 1e-12 } else { 0.0 };
+            self.information[(which[a], which[b])] + own
+        });
+        let Some(h) = h.cholesky() else { return false };
+        let followed = h.solve(&DVector::from_iterator(which.len(), which.iter().map(|&j| -slope[j])));
+        which.iter().zip(followed.iter()).for_each(|(&j, s)| step[j] = *s);
+        step.iter().all(|v| v.is_finite())
+    }
+
     /// What a step gains as far as the derivatives reach.
     pub(crate) fn gain(&self, step: &DVector<f64>) -> f64 {
         -(2.0 * self.gradient.dot(step) + (step.transpose() * &self.information * step)[(0, 0)])

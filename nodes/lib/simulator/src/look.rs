@@ -34,12 +34,6 @@ impl Fitter<'_> {
             let place = |f: &f64| {
                 let mut values = from.point.values.clone();
                 values[c] = self.within(c, values[c] * f);
-                // A count between two is two rollouts.
-                values
-                    .iter_mut()
-                    .zip(self.model.candidates)
-                    .filter(|(_, k)| k.integer)
-                    .for_each(|(v, _)| *v = v.round());
                 (c, values)
             };
             factors.iter().map(place).filter(|(c, v)| v[*c] != from.point.values[*c]).collect()
@@ -69,40 +63,29 @@ impl Fitter<'_> {
         state: &State,
         silent: &[usize],
     ) -> Result<(Vec<Likely>, Vec<usize>), SimulatorError> {
-        /// Shares of the way to the lower and to the upper bound: scales are positive, and their small values lie close together. First
-        /// where most shows; the others only of candidates that show something there.
+        /// Shares of the way to the lower and to the upper bound where most shows: scales are positive, and their small values lie close
+        /// together.
         const FIRST: [f64; 2] = [-0.95, 0.5];
-        const THEN: [f64; 9] = [-0.9, -0.85, -0.8, -0.7, -0.6, -0.5, -0.35, 0.05, 0.2];
+        /// A limit at a hundredth of the way is found.
+        const HALVINGS: usize = 7;
         let layout = &self.layout;
         let before = state.training(layout);
-        let bound = |c: usize, share: f64| {
-            let candidate = &self.model.candidates[c];
-            if share < 0.0 { candidate.low } else { candidate.high }
-        };
         // By candidate: shares of the ways to its bounds, with what the simulator says there.
         let mut looks: Vec<(usize, Vec<(f64, State)>)> = silent.iter().map(|&c| (c, Vec::new())).collect();
-        let mut looked = silent.to_vec();
-        for shares in [FIRST.as_slice(), &THEN] {
-            let mut places: Vec<(usize, f64, Vec<f64>)> = Vec::new();
-            for (&c, &share) in looked.iter().flat_map(|c| shares.iter().map(move |share| (c, share))) {
-                let here = state.point.values[c];
-                let value = here + share.abs() * (bound(c, share) - here);
-                let mut values = state.point.values.clone();
-                values[c] = if self.model.candidates[c].integer { value.round() } else { value };
-                if values[c] != here {
-                    places.push((c, share, values));
-                }
-            }
-            let points: Vec<Vec<f64>> = places.iter().map(|p| p.2.clone()).collect();
-            let trials = if points.is_empty() { Vec::new() } else { self.still(state, &points)? };
-            for ((c, share, _), trial) in places.into_iter().zip(trials) {
-                if let Some((_, looks)) = looks.iter_mut().find(|l| l.0 == c) {
-                    looks.push((share, trial));
-                }
-            }
-            let shows = |looks: &[(f64, State)]| looks.iter().any(|(_, s)| s.residuals != state.residuals);
-            looked = looks.iter().filter(|(_, l)| shows(l)).map(|(c, _)| *c).collect();
+        self.look(state, &mut looks, |_| FIRST.to_vec())?;
+        // A limit acts from where it first shows, and the best may lie close to there.
+        let shows = |look: &State| look.residuals != state.residuals;
+        let show = |looks: &[(f64, State)]| looks.iter().any(|(_, s)| shows(s));
+        for _ in 0..HALVINGS {
+            self.look(state, &mut looks, |looks| {
+                let seen: Vec<Look> = looks
+                    .iter()
+                    .map(|(share, s)| Look { share: *share, cost: s.training(layout), shows: shows(s) })
+                    .collect();
+                closer(&seen, before)
+            })?;
         }
+        let looked: Vec<usize> = looks.iter().filter(|(_, l)| show(l)).map(|(c, _)| *c).collect();
         let mute = silent.iter().copied().filter(|c| !looked.contains(c)).collect();
         let best = |looks: &[(f64, State)]| {
             let states = looks.iter().map(|(_, s)| s);
@@ -115,6 +98,35 @@ impl Fitter<'_> {
         });
         let likely = likely.collect();
         Ok((likely, mute))
+    }
+
+    /// Looks at each candidate at some shares of the ways to its bounds (below zero to the lower one), chosen by what was seen there so far.
+    fn look(
+        &self,
+        state: &State,
+        looks: &mut [(usize, Vec<(f64, State)>)],
+        shares: impl Fn(&[(f64, State)]) -> Vec<f64>,
+    ) -> Result<(), SimulatorError> {
+        let mut places: Vec<(usize, f64, Vec<f64>)> = Vec::new();
+        for (place, (c, looks)) in looks.iter().enumerate() {
+            let candidate = &self.model.candidates[*c];
+            for share in shares(looks) {
+                let here = state.point.values[*c];
+                let bound = if share < 0.0 { candidate.low } else { candidate.high };
+                let value = here + share.abs() * (bound - here);
+                let mut values = state.point.values.clone();
+                values[*c] = self.within(*c, value);
+                if values[*c] != here && !looks.iter().any(|(_, s)| s.point.values[*c] == values[*c]) {
+                    places.push((place, share, values));
+                }
+            }
+        }
+        let points: Vec<Vec<f64>> = places.iter().map(|p| p.2.clone()).collect();
+        let trials = self.still(state, &points)?;
+        for ((place, share, _), trial) in places.into_iter().zip(trials) {
+            looks[place].1.push((share, trial));
+        }
+        Ok(())
     }
 
     /// Follows each candidate along its own line: where the line of two points has its least, there is the next.
@@ -171,5 +183,65 @@ impl Fitter<'_> {
         let share = (s0 + normal.step(0.0)?[0]).clamp(-1.0, 4.0);
         let known = looks.iter().any(|(s, _)| (s - share).abs() < 0.05 * share.abs().max(0.05));
         (!known).then_some(share)
+    }
+}
+
+/// What was seen at a share of the way to a bound (below zero to the lower one).
+#[derive(Debug, Clone, Copy)]
+struct Look {
+    share: f64,
+    cost: f64,
+    shows: bool,
+}
+
+/// Where to look next: around the best that leaves less than `before`, if it is among the last four; where none does, towards each bound
+/// between the first look that shows something and the one before.
+fn closer(looks: &[Look], before: f64) -> Vec<f64> {
+    const SIDES: [f64; 2] = [-1.0, 1.0];
+    let beside = |at: f64, side: f64| {
+        let known = looks.iter().map(|l| l.share).chain([0.0, -1.0, 1.0]);
+        let away = known.map(|share| (share - at) * side).filter(|d| *d > 0.0);
+        Some(at + 0.5 * side * away.min_by(f64::total_cmp)?)
+    };
+    let best = looks.iter().enumerate().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+    if let Some((place, best)) = best.filter(|(_, l)| l.cost < before) {
+        let is_new = place + 2 * SIDES.len() >= looks.len();
+        return SIDES.into_iter().filter(|_| is_new).filter_map(|side| beside(best.share, side)).collect();
+    }
+    let first = |side: f64| {
+        let shown = looks.iter().filter(|l| l.shows && l.share * side > 0.0);
+        shown.map(|l| l.share).min_by(|a, b| a.abs().total_cmp(&b.abs()))
+    };
+    SIDES.into_iter().filter_map(|side| beside(first(side)?, -side)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_is_found_that_helps_only_close_to_where_it_first_shows() {
+        // Nothing shows above 0.62 of the way, more than a tenth further everything is worse than without a limit.
+        let look = |share: f64| {
+            let (at, shows) = (share.abs(), share < -0.62);
+            let cost = if shows { 100.0 - 50.0 + 1e4 * (at - 0.66).powi(2) } else { 100.0 };
+            Look { share, cost, shows }
+        };
+        let mut looks = vec![look(-0.95), look(0.5)];
+        for _ in 0..7 {
+            looks.extend(closer(&looks, 100.0).into_iter().map(look).collect::<Vec<_>>());
+        }
+        let best = looks.iter().min_by(|a, b| a.cost.total_cmp(&b.cost)).unwrap();
+        assert!((best.share + 0.66).abs() < 0.03, "{looks:?}");
+        assert!(looks.len() <= 2 + 2 * 7, "{looks:?}");
+    }
+
+    #[test]
+    fn looking_ends_where_it_no_longer_helps() {
+        let look = |share: f64| Look { share, cost: 1.0 + (share + 0.95).abs(), shows: true };
+        let looks: Vec<Look> = [-0.95, 0.5, -0.9].map(look).to_vec();
+        assert_eq!(closer(&looks, 2.0), [-0.975, -0.925]);
+        let more: Vec<Look> = looks.into_iter().chain([-0.975, -0.925].map(look)).collect();
+        assert!(closer(&more, 2.0).is_empty());
     }
 }

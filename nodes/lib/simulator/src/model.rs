@@ -99,21 +99,22 @@ impl<'a> Model<'a> {
 
     /// Residuals at several points, each with its disturbance where there are any.
     pub(crate) fn kicked(&self, points: &[Point], kicks: &[Kicks]) -> Result<Vec<Residuals>, SimulatorError> {
-        // A fractional count is a mixture of its neighbours: a pass each.
-        let mut passes: Vec<(usize, Vec<f64>, f64)> = Vec::new();
-        // By point: its passes with their weights. What only the sensors see needs no pass of its own.
-        let mut shares: Vec<Vec<(usize, f64)>> = vec![Vec::new(); points.len()];
+        if points.is_empty() {
+            return Ok(Vec::new());
+        }
+        // What only the sensors see needs no pass of its own.
+        let mut passes: Vec<(usize, Vec<f64>)> = Vec::new();
+        let mut pass_of: Vec<usize> = Vec::with_capacity(points.len());
         for (place, point) in points.iter().enumerate() {
-            for (values, weight) in self.mixture(&point.values) {
-                let same = |(other, seen, _): &(usize, Vec<f64>, f64)| {
-                    *seen == values && kicks.is_empty() && self.drives_alike(&points[*other], point)
-                };
-                let known = passes.iter().position(same).unwrap_or(passes.len());
-                if known == passes.len() {
-                    passes.push((place, values, weight));
-                }
-                shares[place].push((known, weight));
+            let values = self.own(&point.values);
+            let same = |(other, seen): &(usize, Vec<f64>)| {
+                *seen == values && kicks.is_empty() && self.drives_alike(&points[*other], point)
+            };
+            let known = passes.iter().position(same).unwrap_or(passes.len());
+            if known == passes.len() {
+                passes.push((place, values));
             }
+            pass_of.push(known);
         }
         let mut out: Vec<Residuals> = vec![Vec::new(); points.len()];
         for number in 0..self.drive.stretches.len() {
@@ -126,16 +127,8 @@ impl<'a> Model<'a> {
             let plan = Plan::new(stretch, &windows, self.roll.description().step_s);
             let batch = self.batch(stretch, number, &windows, &plan, points, &passes, kicks);
             let outputs = self.roll.rollout(&batch)?;
-            let mut sums: Vec<Vec<f64>> = vec![Vec::new(); points.len()];
-            for (place, shares) in shares.iter().enumerate() {
-                for (b, weight) in shares {
-                    let predicted = self.predicted(&windows, &plan, &outputs, *b, &points[place]);
-                    let sum = &mut sums[place];
-                    sum.resize(predicted.len(), 0.0);
-                    sum.iter_mut().zip(predicted).for_each(|(s, y)| *s += weight * y);
-                }
-            }
-            for (residuals, predicted) in out.iter_mut().zip(sums) {
+            for ((residuals, &pass), point) in out.iter_mut().zip(&pass_of).zip(points) {
+                let predicted = self.predicted(&windows, &plan, &outputs, pass, point);
                 residuals
                     .extend(self.measured(&windows).zip(predicted).map(|((m, sigma), y)| (m - y) / sigma));
             }
@@ -165,22 +158,15 @@ impl<'a> Model<'a> {
         around
     }
 
-    /// The simulator's own parameters at some values of the candidates, a fractional count as a mixture of whole ones.
-    fn mixture(&self, values: &[f64]) -> Vec<(Vec<f64>, f64)> {
-        let mut parts = vec![(self.roll.description().values(), 1.0)];
+    /// The simulator's own parameters at some values of the candidates.
+    fn own(&self, values: &[f64]) -> Vec<f64> {
+        let mut out = self.roll.description().values();
         for (candidate, &value) in self.candidates.iter().zip(values) {
-            let Kind::Own(place) = candidate.kind else { continue };
-            let share = value - value.floor();
-            if candidate.integer && share > 1e-9 && parts.len() < 4 {
-                let upper = parts.iter().map(|(p, w)| (with(p, place, value.floor() + 1.0), w * share));
-                let lower = parts.iter().map(|(p, w)| (with(p, place, value.floor()), w * (1.0 - share)));
-                parts = lower.chain(upper).collect();
-            } else {
-                let whole = if candidate.integer { value.round() } else { value };
-                parts.iter_mut().for_each(|(p, _)| p[place] = whole);
+            if let Kind::Own(place) = candidate.kind {
+                out[place] = if candidate.integer { value.round() } else { value };
             }
         }
-        parts
+        out
     }
 
     #[allow(clippy::too_many_arguments, reason = "the parts of one message")]
@@ -191,7 +177,7 @@ impl<'a> Model<'a> {
         windows: &[(usize, &Window)],
         plan: &Plan,
         points: &[Point],
-        passes: &[(usize, Vec<f64>, f64)],
+        passes: &[(usize, Vec<f64>)],
         kicks: &[Kicks],
     ) -> Batch {
         let description = self.roll.description();
@@ -369,10 +355,4 @@ impl<'a> Model<'a> {
             })
         })
     }
-}
-
-fn with(parameters: &[f64], place: usize, value: f64) -> Vec<f64> {
-    let mut out = parameters.to_vec();
-    out[place] = value;
-    out
 }

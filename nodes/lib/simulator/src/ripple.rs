@@ -78,7 +78,7 @@ impl Fitter<'_> {
                 for (&c, d) in active.iter().zip(others.iter()) {
                     // Counts stay whole.
                     let is_count = self.model.candidates[c].integer;
-                    values[c] = if is_count { self.within(c, values[c] + d) } else { values[c] + d };
+                    values[c] = if is_count { (values[c] + d).round() } else { values[c] + d };
                 }
                 let bounds = |c: usize| self.model.candidates[c].low..=self.model.candidates[c].high;
                 let is_inside = active.iter().all(|&c| bounds(c).contains(&values[c]));

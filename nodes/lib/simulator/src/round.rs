@@ -55,7 +55,9 @@ impl Fitter<'_> {
             let is_one_more = k < FITTED_IF_UNEXPLAINED
                 && least(&fits) > unexplained
                 && self.rollouts() + FIT <= MOST_ROLLOUTS;
-            if is_worth_it && (k < FITTED || is_one_more) {
+            let is_due =
+                fits.is_empty() || k < FITTED && self.rollouts() + FIT <= MOST_ROLLOUTS || is_one_more;
+            if is_worth_it && is_due {
                 fits.push(self.with(&ahead, *c, trial)?);
             }
         }
@@ -84,7 +86,6 @@ impl Fitter<'_> {
             followed.sort_by(|a, b| a.1.training(layout).total_cmp(&b.1.training(layout)));
         }
         found.compared = followed.iter().map(|(c, s)| (*c, s.training(layout))).collect();
-        found.columns = ahead.columns;
         fits.sort_by(|a, b| a.state.training(layout).total_cmp(&b.state.training(layout)));
         let Some(best) = fits.first() else { return Ok(None) };
         let alike: Vec<&Fitted> =
@@ -101,16 +102,13 @@ impl Fitter<'_> {
     /// Derivatives at the model so far, and what they say of the candidates, likeliest first.
     fn ahead(&self, found: &mut Found) -> Result<(Ahead, Vec<Likely>), SimulatorError> {
         let active = found.active();
-        let here = found.state();
         let all: Vec<usize> = (0..self.model.candidates.len()).filter(|c| !found.mute.contains(c)).collect();
         let looked = match found.columns.is_empty() {
             true => all,
-            false => self.screened(here, &found.columns, &active, &all),
+            false => self.screened(found.state(), &found.columns, &active, &all),
         };
-        let (state, known) = self.around(here.point.clone(), Some(here.residuals.clone()), &looked)?;
-        let mut columns = std::mem::take(&mut found.columns);
-        columns.resize(self.model.candidates.len(), vec![0.0; state.residuals.len()]);
-        looked.iter().zip(known).for_each(|(&c, column)| columns[c] = column);
+        let state = self.derivatives(found, &looked)?;
+        let columns = found.columns.clone();
         let mut likely = self.likely(&state, &columns, &active, &looked);
         let silent: Vec<usize> =
             looked.iter().copied().filter(|c| !active.contains(c) && is_silent(&columns[*c])).collect();

@@ -50,11 +50,29 @@ pub(crate) struct Found {
     pub(crate) mute: Vec<usize>,
     /// Derivatives by every candidate, where they were last taken.
     pub(crate) columns: Vec<Residuals>,
+    /// Where that was last, and of which candidates.
+    pub(crate) taken: Option<(State, Vec<usize>)>,
     /// Whether values far apart have been looked at.
     pub(crate) zoomed: bool,
 }
 
 impl Found {
+    /// Of a simulator as it came: nothing found yet.
+    pub(crate) fn new(null: State) -> Self {
+        Self {
+            null,
+            fit: None,
+            steps: Vec::new(),
+            confused: Vec::new(),
+            alike: Vec::new(),
+            compared: Vec::new(),
+            mute: Vec::new(),
+            columns: Vec::new(),
+            taken: None,
+            zoomed: false,
+        }
+    }
+
     /// The last model.
     pub(crate) fn state(&self) -> &State {
         self.fit.as_ref().map_or(&self.null, |f| &f.state)
@@ -73,17 +91,7 @@ impl Fitter<'_> {
     /// What the simulator says.
     pub(crate) fn search(&self, progress: &mut dyn FnMut(&str)) -> Result<Found, SimulatorError> {
         progress("the simulator as it came");
-        let mut found = Found {
-            null: self.at(self.model.null())?,
-            fit: None,
-            steps: Vec::new(),
-            confused: Vec::new(),
-            alike: Vec::new(),
-            compared: Vec::new(),
-            mute: Vec::new(),
-            columns: Vec::new(),
-            zoomed: false,
-        };
+        let mut found = Found::new(self.at(self.model.null())?);
         loop {
             let size = found.active().len();
             let (noise, left) = (UNEXPLAINED * self.residuals(), found.state().training(&self.layout));
@@ -130,11 +138,32 @@ impl Fitter<'_> {
         Ok(found)
     }
 
+    /// Takes derivatives by some candidates at the model found, and returns it with those by its starts. What is known there already is not asked
+    /// for again.
+    ///
+    /// # Errors
+    /// What the simulator says.
+    pub(crate) fn derivatives(&self, found: &mut Found, wanted: &[usize]) -> Result<State, SimulatorError> {
+        let here = found.state().clone();
+        found.columns.resize(self.model.candidates.len(), vec![0.0; here.residuals.len()]);
+        let (state, mut taken) = match found.taken.take() {
+            Some((state, taken)) if state.point == here.point => (state, taken),
+            _ => (self.around(here.point, Some(here.residuals), &[])?.0, Vec::new()),
+        };
+        let missing: Vec<usize> = wanted.iter().copied().filter(|c| !taken.contains(c)).collect();
+        for (&c, column) in missing.iter().zip(self.columns_of(&state, &missing)?) {
+            found.columns[c] = column;
+        }
+        taken.extend(missing);
+        found.taken = Some((state.clone(), taken));
+        Ok(state)
+    }
+
     /// A fit without what is not evident in it.
     pub(crate) fn pruned(&self, mut fit: Fitted) -> Result<Fitted, SimulatorError> {
         while let Some(place) = fit.least_evident()
             && fit.sizes.len() > 1
-            && self.rollouts() + FIT <= MOST_ROLLOUTS
+            && self.rollouts() + FREE_TERMS <= MOST_ROLLOUTS
         {
             let mut kept = fit.members();
             let given_up = kept.remove(place);

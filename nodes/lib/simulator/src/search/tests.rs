@@ -35,7 +35,9 @@ fn one_change_is_found_with_its_size() {
             let (named, passes, left) = found(&[(place, value)], seed);
             assert_eq!(named.len(), 1, "{name} {seed}: {named:?}");
             assert_eq!(named[0].0, name);
-            assert!((named[0].1 - value).abs() < 0.03 * value && left.is_finite(), "{named:?} {left}");
+            // A count is a whole one, on the way and at the end.
+            let accuracy = if name == "simulator.delay_steps" { 1e-9 } else { 0.03 * value };
+            assert!((named[0].1 - value).abs() < accuracy && left.is_finite(), "{named:?} {left}");
             assert!(passes < 300, "{passes}");
         }
     }
@@ -51,6 +53,32 @@ fn a_grip_that_shows_only_where_it_is_reached_is_found() {
         assert!(named[0].0 == "simulator.grip" && (named[0].1 - grip).abs() < 0.01 * grip, "{named:?}");
         assert!(passes < 300, "{passes}");
     }
+}
+
+#[test]
+fn derivatives_that_are_known_are_not_asked_for_again() {
+    let car = TestCar::new();
+    let (sequence, commands) = car.recorded(&[(0, 48.0)], 20.0, 5);
+    let file = SimulatorFile::parse("command: [none]", std::env::temp_dir().as_path()).unwrap();
+    let drive = Drive::new(&sequence, commands, &[Channel::VYMps, Channel::YawRateRadps]).unwrap();
+    let list = candidates(car.description(), &file, &drive.channels, true, &[]);
+    let model = Model::new(&car, &file, &drive, &list, true);
+    let fitter = Fitter::new(&model);
+    let mut found = Found::new(fitter.at(model.null()).unwrap());
+    fitter.derivatives(&mut found, &[0, 1]).unwrap();
+    let (before, known) = (car.passes(), found.columns.clone());
+    let state = fitter.derivatives(&mut found, &[1, 0]).unwrap();
+    assert_eq!((car.passes(), &found.columns), (before, &known));
+    fitter.derivatives(&mut found, &[0, 2]).unwrap();
+    assert_eq!(car.passes(), before + 1);
+    // The same as all at once.
+    let all = fitter.around(state.point, Some(state.residuals), &[0, 1, 2]).unwrap().1;
+    assert_eq!(all, found.columns[..3]);
+    // Elsewhere nothing is known.
+    found.null.point.values[0] *= 0.9;
+    let passes = car.passes();
+    fitter.derivatives(&mut found, &[0]).unwrap();
+    assert!(car.passes() > passes && found.columns[0] != known[0]);
 }
 
 #[test]
