@@ -3,13 +3,14 @@
     fault_campaign.py OUT [--faults 1000] [--seed 1] [--bin FOLDER] [--rate 10] [--minutes M] [--job K]
 
 Faults of topics are the fault_injector's (its README has the kinds); faults of processes are made here: a node killed and started again, a
-node that stands still, the peer started again, a second identifier, a subscriber that stands still for good. Ten faults a run, all between 3 and 28 s
-of a drive of 62 s. Writes OUT/runs.csv (a row a run, those without faults first), OUT/faults.csv (a row a fault) and OUT/README.md.
+node that stands still, the peer started again, a second identifier, a subscriber that stands still for good. Ten faults a run, all begun between 3 and
+28 s of the drive, those of topics ended there, too. Writes OUT/runs.csv (a row a run, those without faults first), OUT/faults.csv (a row a fault) and OUT/README.md.
 
 A set is harmful where it promises, anywhere within its slips, more than 10 % of the largest true force driven above the true curve, which is the
 Magic Formula fitted to the plant's own F_y / F_z. A run has recovered when every node lives and reports, the last window has been identified, and
 a usable set came from a window that ended after the last fault, a valid reading of the camera came after it, and every file written is whole. The camera
-is fooled where it gives a valid reading of a picture that was black. It hangs when a node does not end within 2 s of SIGINT.
+is fooled where it gives a valid reading of a picture that was black, and tells where it refuses one as dark. It hangs when a node does not end within 2 s
+of SIGINT.
 """
 
 import argparse
@@ -29,8 +30,15 @@ import numpy as np
 import yaml
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-DURATION_S = 62
 SPAN_S = (3.0, 28.0)
+# A fault of a process lasts at most so long, and a node that was killed or stood still takes so long to be in the network again; both by the
+# machine's clock, while the drive goes on at its pace.
+STILL_S, BACK_S = 1.5, 1.0
+# What the drive has left after them: whenever the windows began anew, one of 30 s that begins each 10 s is whole.
+REST_S = 40.0
+CAMERA_HZ = 2
+# What a picture's age may be, and how far its stamp may lie ahead of the clock, at the pace of a car (camera_prior's defaults).
+AGE_S, AHEAD_S = 0.5, 0.1
 TOPIC_FAULTS, PROCESS_FAULTS = 8, 2
 HARMFUL = 0.1
 END_S = 2.0
@@ -94,13 +102,13 @@ def fitted(slip, load_share):
 class Drive:
     """A bag with its truth."""
 
-    def __init__(self, folder, simulate, car, track, mu, pace, seed):
+    def __init__(self, folder, simulate, duration_s, car, track, mu, pace, seed):
         self.name = f"{car} {track} mu {mu} pace {pace} seed {seed}"
         self.bag = folder / f"{car}_{track}_{seed}.mcap"
         self.vehicle = self.bag.with_suffix(".vehicle.yaml")
         if not self.bag.exists():
-            numbers = ["--mu", mu, "--pace", pace, "--seed", seed, "--duration", DURATION_S]
-            command = [simulate, "simulate", "--car", car, "--track", track, "--realistic", "--camera", "--out", self.bag, *numbers]
+            numbers = ["--mu", mu, "--pace", pace, "--seed", seed, "--duration", duration_s]
+            command = [simulate, "simulate", "--car", car, "--track", track, "--realistic", "--camera", CAMERA_HZ, "--out", self.bag, *numbers]
             subprocess.run([str(part) for part in command], check=True, stdout=subprocess.DEVNULL)
         with self.bag.with_suffix(".truth.csv").open() as file:
             rows = list(csv.DictReader(file))
@@ -169,6 +177,9 @@ class Run:
         log = (self.logs / f"{name}.log").open("a")
         # In replay no sample is lost, but where a fault says so.
         common = ["-p", "reliable_inputs:=true"] if (program or name) != "bag_player" else []
+        if name == "camera_prior":
+            # Both are the machine's own delays: the drive goes on during them, at its pace.
+            common += ["-p", f"most_age_s:={AGE_S * self.args.rate}", "-p", f"most_ahead_s:={AHEAD_S * self.args.rate}"]
         command = [self.args.bin / (program or name), "--ros-args", *common, *arguments]
         self.processes[name] = subprocess.Popen([str(part) for part in command], stderr=log, stdout=log)
 
@@ -197,7 +208,7 @@ class Run:
             self.node(name)
         elif kind.startswith("stood still"):
             self.processes[name].send_signal(signal.SIGSTOP)
-            time.sleep(rng.uniform(0.1, 1.5))
+            time.sleep(rng.uniform(0.1, STILL_S))
             self.processes[name].send_signal(signal.SIGCONT)
         elif kind == "peer restarted":
             self.processes["fault_injector"].kill()
@@ -243,7 +254,7 @@ class Run:
     def judge(self, start, began, played, made):
         topic_faults = [line.split(": ", 1)[1].split() for line in plain(self.log("fault_injector")) if ": fault " in line]
         topic_faults = [words[words.index("of") + 2:] if "of" in words else words for words in topic_faults]
-        ends = [float(f[2]) + float(f[3]) for f in topic_faults] + [at + 1.5 * self.args.rate for _, at in made]
+        ends = [float(f[2]) + float(f[3]) for f in topic_faults] + [at + STILL_S * self.args.rate for _, at in made]
         last_fault = began + max(ends, default=0.0) / self.args.rate
         newest = lambda: next((m.handshake.sequence_id for _, m in reversed(self.heard.since(start, "window"))), None)
         results = lambda: [(w, m) for w, m in self.heard.since(start, "end") if m.status != PROPOSED]
@@ -259,11 +270,11 @@ class Run:
         usable = [m for _, m in results() if m.status in USABLE and ended.get(m.handshake.sequence_id, 0.0) > last_fault]
         sets = [m for _, m in self.heard.since(start, "set") if m.status in USABLE]
         promised = [self.drive.promised_too_much(m) for m in sets]
-        readings = [(when, m) for when, m in self.heard.since(start, "friction") if m.source == CAMERA and m.valid]
-        sees = any(when > last_fault for when, _ in readings)
-        fooled = self.fooled(topic_faults, [m for _, m in readings])
+        answers = [(when, m) for when, m in self.heard.since(start, "friction") if m.source == CAMERA]
+        seen = [m.mu for when, m in answers if m.valid and when > last_fault]
+        of_black = self.of_black(topic_faults, made, [m for _, m in answers])
         torn = [path.name for path in (self.logs / "files").glob("[!.]*.yaml") if not whole(path)]
-        for text, found in ((f"not whole: {torn}", torn), ("the last window was not identified", not identified), (f"silent: {silent}", silent), ("the camera reads nothing", not sees), (f"ended: {dead}", dead)):
+        for text, found in ((f"not whole: {torn}", torn), ("the last window was not identified", not identified), (f"silent: {silent}", silent), ("the camera reads nothing", not seen), (f"ended: {dead}", dead)):
             if found:
                 self.notes.append(text)
         if not usable:
@@ -272,20 +283,27 @@ class Run:
         row = {
             "drive": self.drive.name, "seed": self.seed, "faults": len(topic_faults) + len(made), "sets": len(sets),
             "usable_after": len(usable), "promised_too_much": f"{max(promised, default=math.nan):.4f}",
-            "harmful": sum(p > HARMFUL for p in promised), "recovered": int(identified and not silent and not dead and not torn and sees and bool(usable)),
-            "fooled": fooled, "hang": int(took > END_S), "end_s": f"{took:.2f}", "played_s": f"{played - began:.1f}", "note": " | ".join(self.notes),
+            "harmful": sum(p > HARMFUL for p in promised), "recovered": int(identified and not silent and not dead and not torn and bool(seen and usable)),
+            "black": len(of_black), "fooled": of_black.count(""), "told": sum(reason in ("dark", "frozen") for reason in of_black),
+            "mu": f"{seen[-1] if seen else math.nan:.3f}", "hang": int(took > END_S), "end_s": f"{took:.2f}", "played_s": f"{played - began:.1f}", "note": " | ".join(self.notes),
         }
         faults = [(f[0], f[1], f[2], f[3], f[4]) for f in topic_faults] + [(kind, "", f"{at:.2f}", "", "") for kind, at in made]
         return row, faults
 
-    def fooled(self, faults, readings):
-        """Valid readings of pictures that were black, by their stamps; none is counted where these were harmed, too."""
-        pictures = [(fault[0], float(fault[2]), float(fault[3])) for fault in faults if fault[1] == "image/compressed"]
+    def of_black(self, faults, made, answers):
+        """Why each picture that was black, by its stamp, was not used: empty where it was. Where a picture's stamp or place or bytes were harmed, too,
+        whether it was black is not known, and none is counted."""
+        pictures = [(fault[0], float(fault[2]), float(fault[2]) + float(fault[3])) for fault in faults if fault[1] == "image/compressed"]
         first = re.search(r"the first message is stamped (\d+) ns", self.log("fault_injector"))
         if first is None or any(kind == "time" for kind, _, _ in pictures):
-            return 0
-        after_s = [m.header.stamp.sec + 1e-9 * m.header.stamp.nanosec - 1e-9 * int(first[1]) for m in readings]
-        return sum(begin <= at < begin + length for kind, begin, length in pictures if kind == "dark" for at in after_s)
+            return []
+        unclear = [(begin, end) for kind, begin, end in pictures if kind in ("delay", "reorder", "corrupt")]
+        # A peer that was started again goes on without its faults.
+        harmed_until = min((at - 1.0 for kind, at in made if kind == "peer restarted"), default=math.inf)
+        dark = [(b, min(e, harmed_until)) for kind, b, e in pictures if kind == "dark" and not any(c < e and b < f for c, f in unclear)]
+        of_pictures = [m for m in answers if m.reason != "no_picture"]
+        after_s = [(m.header.stamp.sec + 1e-9 * m.header.stamp.nanosec - 1e-9 * int(first[1]), m.reason) for m in of_pictures]
+        return [reason for at, reason in after_s if any(begin <= at < end for begin, end in dark)]
 
     def end(self):
         """Ends all by SIGINT; the time that the slowest took, infinite where one had to be killed."""
@@ -337,14 +355,19 @@ def table(out, command):
     sets, promised = sum(int(run["sets"]) for run in harmed), [float(run["promised_too_much"]) for run in harmed]
     ends = sorted(float(run["end_s"]) for run in runs)
     count = lambda field, rows: sum(int(run[field]) for run in rows)
+    alone = {run["drive"]: float(run["mu"]) for run in plain_runs}
+    off = sorted(abs(float(run["mu"]) - alone[run["drive"]]) for run in harmed if run["mu"] != "nan") or [math.nan]
     lines = [
         "# Faults", "", "```sh", command, "```", "",
-        "Drives of 62 s at ten times their pace, ten faults a run; what counts stands in `tests/peers/fault_campaign.py`.", "",
+        "Ten faults a run; the drives' length, their pace and what counts stand in `tests/peers/fault_campaign.py`.", "",
         "| | without faults | with faults |", "| --- | --- | --- |",
         f"| runs | {len(plain_runs)} | {len(harmed)} |",
         f"| faults | 0 | {len(faults)} |",
         f"| recovered | {count('recovered', plain_runs)} | {count('recovered', harmed)} |",
-        f"| valid readings of black pictures | {count('fooled', plain_runs)} | {count('fooled', harmed)} |",
+        f"| black pictures read by the camera | {count('black', plain_runs)} | {count('black', harmed)} |",
+        f"| of these refused as dark or frozen | {count('told', plain_runs)} | {count('told', harmed)} |",
+        f"| of these taken for a road | {count('fooled', plain_runs)} | {count('fooled', harmed)} |",
+        f"| the camera's last reading off the one without faults, p50, most | | {off[len(off) // 2]:.3f}, {off[-1]:.3f} |",
         f"| hangs | {count('hang', plain_runs)} | {count('hang', harmed)} |",
         f"| sets at the MPC's topic | {count('sets', plain_runs)} | {sets} |",
         f"| runs with a set that promises over 10 % too much, where the drive without faults has none | | {len(harmful)} |",
@@ -394,7 +417,8 @@ def main():
     began = time.monotonic()
     folder = args.out / "drives"
     folder.mkdir(parents=True, exist_ok=True)
-    drives = [Drive(folder, args.simulate or args.bin / "gripsight", *drive) for drive in DRIVES[: args.drives]]
+    duration_s = math.ceil(SPAN_S[1] + (STILL_S + BACK_S) * args.rate + REST_S)
+    drives = [Drive(folder, args.simulate or args.bin / "gripsight", duration_s, *drive) for drive in DRIVES[: args.drives]]
     heard = Heard()
     count, index = 0, 0
     plan = [(drive, None) for drive in drives]
