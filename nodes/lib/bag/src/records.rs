@@ -10,8 +10,9 @@ use std::path::{Path, PathBuf};
 use mcap::records::{Record, op};
 
 use crate::BagError;
+use crate::sqlite::MESSAGE_LIMIT;
 
-/// Longer records than this are taken for damage: no sensor sends a gigabyte.
+/// Longer records than this are taken for damage; in a chunk, longer ones than a message: few bytes there may unpack to many.
 const RECORD_LIMIT: u64 = 1 << 30;
 /// Opcode and length.
 const HEAD_LEN: u64 = 9;
@@ -25,8 +26,8 @@ enum Step {
     End,
 }
 
-/// Reads the next record's body into `body`.
-fn step(source: &mut impl Read, body: &mut Vec<u8>) -> io::Result<Step> {
+/// Reads the next record's body, of at most so many bytes, into `body`.
+fn step(source: &mut impl Read, body: &mut Vec<u8>, most: u64) -> io::Result<Step> {
     body.clear();
     source.by_ref().take(HEAD_LEN).read_to_end(body)?;
     let Some((&opcode, len)) = body.split_first() else { return Ok(Step::End) };
@@ -34,7 +35,7 @@ fn step(source: &mut impl Read, body: &mut Vec<u8>) -> io::Result<Step> {
     body.clear();
     match len {
         Err(_) => Ok(Step::Cut(opcode)),
-        Ok(len) if len > RECORD_LIMIT => Ok(Step::TooLong(len)),
+        Ok(len) if len > most => Ok(Step::TooLong(len)),
         Ok(len) => {
             source.by_ref().take(len).read_to_end(body)?;
             Ok(if body.len() as u64 == len { Step::Record(opcode) } else { Step::Cut(opcode) })
@@ -111,7 +112,7 @@ impl Records {
             return Ok(false);
         }
         self.seek(file_len - tail_len)?;
-        match step(&mut self.file, &mut self.body) {
+        match step(&mut self.file, &mut self.body, RECORD_LIMIT) {
             Ok(Step::Record(op::FOOTER)) => {}
             _ => return Ok(false),
         }
@@ -177,7 +178,7 @@ impl Records {
 
     fn advance_in_file(&mut self) -> Result<u8, BagError> {
         self.at = self.next_at;
-        match step(&mut self.file, &mut self.body).map_err(BagError::io(&self.path))? {
+        match step(&mut self.file, &mut self.body, RECORD_LIMIT).map_err(BagError::io(&self.path))? {
             Step::Record(opcode) => {
                 self.next_at += HEAD_LEN + self.body.len() as u64;
                 if opcode == op::CHUNK {
@@ -222,7 +223,7 @@ impl Records {
 
     /// The next record of the chunk, which stays the source of records while there is one.
     fn advance_in_chunk(&mut self, mut chunk: Chunk) -> Result<Option<u8>, BagError> {
-        match step(&mut chunk.records, &mut self.body) {
+        match step(&mut chunk.records, &mut self.body, MESSAGE_LIMIT) {
             Ok(Step::Record(op::CHUNK | op::FOOTER)) => {
                 Err(self.damaged("a chunk holds a chunk or a footer"))
             }
@@ -252,7 +253,7 @@ impl Records {
     }
 
     fn too_long(&mut self, len: u64) -> BagError {
-        self.damaged(format!("a record of {len} bytes, at most {RECORD_LIMIT} are read"))
+        self.damaged(format!("a record of {len} bytes, which is too long"))
     }
 }
 

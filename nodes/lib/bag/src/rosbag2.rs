@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::BagError;
+use crate::storage::read_text;
 
 /// Under this key a channel's metadata hold the publishers' quality of service.
 pub(crate) const QOS_KEY: &str = "offered_qos_profiles";
@@ -42,7 +43,7 @@ pub(crate) fn files(path: &Path) -> Result<Vec<PathBuf>, BagError> {
             Ok(files)
         };
     }
-    let text = std::fs::read_to_string(&metadata).map_err(BagError::io(&metadata))?;
+    let text = read_text(&metadata).map_err(BagError::io(&metadata))?;
     let MetadataFile { rosbag2_bagfile_information: information } =
         serde_saphyr::from_str(&text).map_err(|e| refuse(format!("metadata.yaml: {e}")))?;
     if information.relative_file_paths.is_empty() {

@@ -1,6 +1,7 @@
 //! rosbag2's sqlite3 files: topics, messages by number, a page at a time.
 //!
-//! Messages that rosbag2 compressed one by one (zstd) are told by their first bytes, which no CDR message has, and unpacked. Format:
+//! Messages that rosbag2 compressed one by one (zstd) are told by their first bytes, which no CDR message has, and unpacked. A file can make
+//! SQLite compute (views, columns that are generated): its tables are plain ones, or it is refused. Format:
 //! rosbag2_storage_sqlite3, schema versions 1 (Foxy) to 4 (Jazzy); columns and tables that a version lacks are taken as empty.
 
 use std::borrow::Cow;
@@ -18,10 +19,11 @@ use crate::{BagError, texts};
 pub(crate) const MAGIC: &[u8] = b"SQLite format 3\0";
 /// How zstd data begin.
 pub(crate) const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
-/// Messages read at once: what is held in memory.
+/// Messages read at once, and bytes after which no further one is: what is held in memory.
 const PAGE: usize = 16;
-/// A message unpacked is no longer than this.
-const MESSAGE_LIMIT: u64 = 1 << 30;
+const PAGE_BYTES: usize = 1 << 26;
+/// A message is no longer than this: ten times the largest pictures and scans.
+pub(crate) const MESSAGE_LIMIT: u64 = 1 << 28;
 
 /// The messages of one file in the order of their numbers, which is the order of recording.
 pub(crate) struct SqliteMessages {
@@ -29,7 +31,7 @@ pub(crate) struct SqliteMessages {
     connection: Connection,
     channels: BTreeMap<i64, Arc<mcap::Channel<'static>>>,
     last_id: i64,
-    page: VecDeque<RawMessage>,
+    page: VecDeque<Row>,
     given: u64,
     done: bool,
 }
@@ -43,6 +45,9 @@ impl SqliteMessages {
             OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX,
         )
         .map_err(failed)?;
+        if let Some(why) = computed(&connection).map_err(failed)? {
+            return Err(BagError::NotABag { path: path.to_owned(), why });
+        }
         let channels = channels(&connection, beside).map_err(failed)?;
         Ok(Self {
             path: path.to_owned(),
@@ -62,25 +67,28 @@ impl SqliteMessages {
 
     fn fill(&mut self) -> Result<(), BagError> {
         let rows = page(&self.connection, self.last_id).map_err(|e| failure(&self.path, self.given, &e))?;
-        for (id, topic_id, stamp_ns, data) in rows {
-            self.last_id = id;
-            let refuse = |why: String| BagError::Sqlite { path: self.path.clone(), message: id, why };
-            let channel = self
-                .channels
-                .get(&topic_id)
-                .ok_or_else(|| refuse(format!("it is of topic {topic_id}, which is not declared")))?;
-            let data = if data.starts_with(&ZSTD_MAGIC) { unpacked(&data).map_err(refuse)? } else { data };
-            let log_time =
-                u64::try_from(stamp_ns).map_err(|_| refuse("its time lies before 1970".to_owned()))?;
-            self.page.push_back(RawMessage {
-                channel: Arc::clone(channel),
-                sequence: 0,
-                log_time,
-                publish_time: log_time,
-                data: Cow::Owned(data),
-            });
+        if let Some((id, ..)) = rows.last() {
+            self.last_id = *id;
         }
+        self.page = rows.into();
         Ok(())
+    }
+
+    fn message(&self, (id, topic_id, stamp_ns, data): Row) -> Result<RawMessage, BagError> {
+        let refuse = |why: String| BagError::Sqlite { path: self.path.clone(), message: id, why };
+        let channel = self
+            .channels
+            .get(&topic_id)
+            .ok_or_else(|| refuse(format!("it is of topic {topic_id}, which is not declared")))?;
+        let data = if data.starts_with(&ZSTD_MAGIC) { unpacked(&data).map_err(refuse)? } else { data };
+        let log_time = u64::try_from(stamp_ns).map_err(|_| refuse("its time lies before 1970".to_owned()))?;
+        Ok(RawMessage {
+            channel: Arc::clone(channel),
+            sequence: 0,
+            log_time,
+            publish_time: log_time,
+            data: Cow::Owned(data),
+        })
     }
 }
 
@@ -88,20 +96,23 @@ impl Iterator for SqliteMessages {
     type Item = Result<RawMessage, BagError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.page.is_empty() && !self.done {
-            match self.fill() {
-                Ok(()) => self.done = self.page.is_empty(),
-                // The messages before the bad one come first.
-                Err(error) if self.page.is_empty() => {
-                    self.done = true;
-                    return Some(Err(error));
-                }
-                Err(_) => {}
+        if self.page.is_empty()
+            && !self.done
+            && let Err(error) = self.fill()
+        {
+            self.done = true;
+            return Some(Err(error));
+        }
+        let message = self.page.pop_front().map(|row| self.message(row));
+        match &message {
+            Some(Ok(_)) => self.given += 1,
+            // After an error nothing follows.
+            Some(Err(_)) | None => {
+                self.page.clear();
+                self.done = true;
             }
         }
-        let message = self.page.pop_front()?;
-        self.given += 1;
-        Some(Ok(message))
+        message
     }
 }
 
@@ -111,9 +122,38 @@ type Row = (i64, i64, i64, Vec<u8>);
 fn page(connection: &Connection, after: i64) -> rusqlite::Result<Vec<Row>> {
     let sql = "SELECT id, topic_id, timestamp, data FROM messages WHERE id > ?1 ORDER BY id LIMIT ?2";
     let mut statement = connection.prepare_cached(sql)?;
-    let rows = statement
-        .query_map((after, PAGE as i64), |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?)))?;
-    rows.collect()
+    let mut rows = statement.query((after, PAGE as i64))?;
+    let (mut page, mut bytes) = (Vec::new(), 0);
+    let mut next = || -> rusqlite::Result<Option<Row>> {
+        let Some(row) = rows.next()? else { return Ok(None) };
+        Ok(Some((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?)))
+    };
+    while bytes < PAGE_BYTES {
+        match next() {
+            Ok(Some(row)) => {
+                bytes += row.3.len();
+                page.push(row);
+            }
+            // The messages before the bad one come first; it comes again with the next page.
+            Err(error) if page.is_empty() => return Err(error),
+            Ok(None) | Err(_) => break,
+        }
+    }
+    Ok(page)
+}
+
+/// Why what is read is not plain tables; none where it is.
+fn computed(connection: &Connection) -> rusqlite::Result<Option<String>> {
+    for table in ["topics", "messages", "message_definitions"] {
+        let sql = "SELECT (SELECT count(*) FROM sqlite_schema WHERE name = ?1 COLLATE NOCASE AND (type <> 'table' OR sql LIKE 'CREATE VIRTUAL%')), \
+                   (SELECT count(*) FROM pragma_table_xinfo(?1) WHERE hidden <> 0)";
+        let (others, generated): (i64, i64) =
+            connection.query_row(sql, (table,), |row| Ok((row.get(0)?, row.get(1)?)))?;
+        if others + generated > 0 {
+            return Ok(Some(format!("its `{table}` is no plain table")));
+        }
+    }
+    Ok(None)
 }
 
 fn channels(
@@ -184,8 +224,11 @@ pub(crate) fn unpacked(data: &[u8]) -> Result<Vec<u8>, String> {
     use std::io::Read as _;
     let mut bytes = Vec::new();
     zstd::Decoder::new(data)
-        .and_then(|decoder| decoder.take(MESSAGE_LIMIT).read_to_end(&mut bytes))
+        .and_then(|decoder| decoder.take(MESSAGE_LIMIT + 1).read_to_end(&mut bytes))
         .map_err(|error| format!("it does not decompress: {error}"))?;
+    if bytes.len() as u64 > MESSAGE_LIMIT {
+        return Err(format!("unpacked it is longer than {} MiB", MESSAGE_LIMIT >> 20));
+    }
     Ok(bytes)
 }
 

@@ -13,6 +13,22 @@ use crate::sqlite::{MAGIC as SQLITE_MAGIC, ZSTD_MAGIC};
 /// How a ROS 1 bag begins.
 const ROS1_MAGIC: &[u8] = b"#ROSBAG";
 
+/// No recording is packed tighter; a file that is made to fill the disk is.
+const MOST_PACKED: u64 = 1000;
+/// Topics files and rosbag2's `metadata.yaml` are no longer (bytes).
+const MOST_TEXT: u64 = 16 << 20;
+
+/// A file's text.
+pub(crate) fn read_text(path: &Path) -> std::io::Result<String> {
+    let mut text = String::new();
+    // What is no plain file does not tell its length.
+    if File::open(path)?.take(MOST_TEXT + 1).read_to_string(&mut text)? as u64 > MOST_TEXT {
+        let error = format!("larger than {} MiB", MOST_TEXT >> 20);
+        return Err(std::io::Error::new(std::io::ErrorKind::FileTooLarge, error));
+    }
+    Ok(text)
+}
+
 /// What a file holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
@@ -42,7 +58,12 @@ pub(crate) fn source(file: &Path) -> Result<Source, BagError> {
     let path = folder.path().join(file.file_stem().unwrap_or_default());
     let mut packed = BufReader::new(File::open(file).map_err(BagError::io(file))?);
     let mut plain = File::create(&path).map_err(BagError::io(&path))?;
-    zstd::stream::copy_decode(&mut packed, &mut plain).map_err(BagError::io(file))?;
+    let most = packed.get_ref().metadata().map_err(BagError::io(file))?.len() * MOST_PACKED;
+    let unpacking = zstd::Decoder::with_buffer(&mut packed).map_err(BagError::io(file))?;
+    if std::io::copy(&mut unpacking.take(most + 1), &mut plain).map_err(BagError::io(file))? > most {
+        let why = format!("unpacked it is more than {MOST_PACKED} times as long");
+        return Err(BagError::NotABag { path: file.to_owned(), why });
+    }
     let kind = kind(file, &self::begin(&path)?)?;
     Ok(Source { path, kind, beside, _unpacked: Some(Arc::new(folder)) })
 }

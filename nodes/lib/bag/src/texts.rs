@@ -4,6 +4,8 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use crate::storage::read_text;
+
 /// The text of a type with those of the types in it, as a bag carries it; `None` where it is not found.
 ///
 /// Looked for in the bag's folder and the one above it, as `package/msg/Type.msg`, `package/Type.msg`, `msg/Type.msg` or `Type.msg`.
@@ -35,7 +37,7 @@ fn definition(type_name: &str, beside: &Path) -> Option<String> {
     ];
     folders
         .flat_map(|folder| places.iter().map(|place| folder.join(place)))
-        .find_map(|path| std::fs::read_to_string(path).ok())
+        .find_map(|path| read_text(&path).ok())
         .or_else(|| gripsight_msgs::definition(type_name).map(str::to_owned))
         .or_else(|| COMMON.iter().find(|(known, _)| *known == type_name).map(|(_, text)| (*text).to_owned()))
 }

@@ -92,6 +92,17 @@ impl Mutants {
         bytes
     }
 
+    /// Another length somewhere: four or eight bytes, the low one first.
+    pub fn length(&mut self, bytes: &mut [u8]) {
+        const LENGTHS: [u64; 8] = [0, 1, 255, 1 << 20, 1 << 31, u32::MAX as u64, 1 << 40, u64::MAX];
+        let size = [4, 8][self.below(2)];
+        if bytes.len() >= size {
+            let at = self.below(bytes.len() - size + 1);
+            let length = LENGTHS[self.below(LENGTHS.len())];
+            bytes[at..at + size].copy_from_slice(&length.to_le_bytes()[..size]);
+        }
+    }
+
     /// Another number in place of the next one.
     fn number(&mut self, bytes: &mut Vec<u8>, at: usize) {
         let is_of_number = |byte: &u8| byte.is_ascii_digit() || b"+-.eE".contains(byte);
@@ -154,5 +165,8 @@ mod tests {
         assert!(made.iter().any(|text| text.contains("1e308")));
         let made = first.binary(&[7; 100], 50, 60);
         assert_eq!(made[..50], [7; 50]);
+        let mut lengths = [7; 100];
+        first.length(&mut lengths);
+        assert_eq!(lengths.iter().filter(|byte| **byte != 7).count() % 4, 0);
     }
 }

@@ -57,11 +57,15 @@ pub(super) struct Slot {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Schema {
     type_name: String,
-    /// Types in the order in which they were met, the message itself first.
+    /// Types in the order in which they were met, the message itself first. None is without a field, and none holds itself.
     types: Vec<(String, Vec<Slot>)>,
 }
 
 const MOST_NESTED: usize = 32;
+/// Fields of a message, those of the messages in it counted each time (of an array once).
+const MOST_FIELDS: usize = 10_000;
+/// A message without fields has one on the wire (rosidl).
+const FILLER: &str = "structure_needs_at_least_one_member";
 
 impl Schema {
     /// Reads the text of a type: its `.msg` file, followed by those of the types in it, each behind a line of `=` and a line
@@ -166,7 +170,12 @@ impl Schema {
         depth: usize,
     ) -> Result<usize, String> {
         if let Some(place) = self.types.iter().position(|(known, _)| known == name) {
-            return Ok(place);
+            // Its fields are not known yet: it is one of those that this one is in.
+            return if self.slots(place).is_empty() {
+                Err(format!("the type {name} holds itself"))
+            } else {
+                Ok(place)
+            };
         }
         if depth > MOST_NESTED {
             return Err(format!("types nested deeper than {MOST_NESTED}"));
@@ -202,8 +211,28 @@ impl Schema {
             };
             slots.push(Slot { name: field.name.clone(), shape, count });
         }
+        if slots.is_empty() {
+            let shape = Shape::Primitive(Primitive::U8);
+            slots.push(Slot { name: FILLER.to_owned(), shape, count: None });
+        }
         self.types[place].1 = slots;
+        if self.fields(place, 0) > MOST_FIELDS {
+            return Err(format!("the type {name} has more than {MOST_FIELDS} fields"));
+        }
         Ok(place)
+    }
+
+    /// `before` and the fields of a type; counts no further than too many.
+    fn fields(&self, index: usize, before: usize) -> usize {
+        let mut count = before;
+        for slot in self.slots(index) {
+            count = match slot.shape {
+                _ if count > MOST_FIELDS => return count,
+                Shape::Message(nested) => self.fields(nested, count),
+                Shape::Primitive(_) | Shape::String => count + 1,
+            };
+        }
+        count
     }
 }
 

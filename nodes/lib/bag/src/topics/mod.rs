@@ -19,6 +19,7 @@ pub use mapped::MappedTopic;
 pub(crate) use mapped::schema;
 pub use mapping::Mapping;
 
+use crate::storage::read_text;
 use crate::{Bag, BagError, Topic};
 
 /// A stream of telemetry with a message type of its own.
@@ -148,7 +149,7 @@ impl TopicMap {
     /// # Errors
     /// [`BagError::Io`], [`BagError::TopicsFile`].
     pub fn read(path: &Path) -> Result<Self, BagError> {
-        let text = std::fs::read_to_string(path).map_err(BagError::io(path))?;
+        let text = read_text(path).map_err(BagError::io(path))?;
         Self::parse(&text).map_err(|why| BagError::TopicsFile { path: path.to_owned(), why })
     }
 

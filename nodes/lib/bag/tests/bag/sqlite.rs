@@ -12,10 +12,10 @@ use tempfile::TempDir;
 use crate::support::{WHOLE, drive, odometry, stamp_ns, telemetry_bag};
 
 /// Name and type of a topic, and its messages with their times.
-type Topic<'a> = (&'a str, &'a str, Vec<(i64, Vec<u8>)>);
+pub(crate) type Topic<'a> = (&'a str, &'a str, Vec<(i64, Vec<u8>)>);
 
 /// A file as rosbag2 of Humble writes it; of Jazzy where types have texts.
-fn write(path: &Path, topics: &[Topic<'_>], packed: bool, texts: &[(&str, &str)]) -> PathBuf {
+pub(crate) fn write(path: &Path, topics: &[Topic<'_>], packed: bool, texts: &[(&str, &str)]) -> PathBuf {
     let db = Connection::open(path).unwrap();
     db.execute_batch(
         "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, serialization_format TEXT NOT NULL, \
@@ -48,7 +48,7 @@ fn write(path: &Path, topics: &[Topic<'_>], packed: bool, texts: &[(&str, &str)]
     path.to_owned()
 }
 
-fn standard(samples: usize) -> [Topic<'static>; 2] {
+pub(crate) fn standard(samples: usize) -> [Topic<'static>; 2] {
     let rows = |f: &dyn Fn(usize) -> Vec<u8>| (0..samples).map(|k| (stamp_ns(k), f(k))).collect();
     [
         ("/odom", Odometry::TYPE, rows(&|k| to_cdr(&encode::odometry(&odometry(k))).unwrap())),
