@@ -1,13 +1,15 @@
-//! Damaged and made-up files: basis, calibration and model. Each is answered, in bounded memory, and the error names the file.
+//! Damaged and made-up files: basis, calibration, model and pictures. Each is answered, in bounded memory, and the error names the file.
 
 #![allow(clippy::unwrap_used)]
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use gripsight_friction::{
-    APPEARANCE, Basis, Calibration, Example, FrictionError, INPUT_SIDE, Network, OnnxRuntime, find_library,
-    find_model, read_picture,
+    APPEARANCE, Basis, Calibration, Example, FrameData, FrictionError, INPUT_SIDE, Network, OnnxRuntime,
+    Preprocessor, QualityStatistics, RawPicture, Region, appearance, decode, find_library, find_model,
+    read_picture,
 };
 use gripsight_mutants::{Mutants, bombs, peak_memory_mb};
 
@@ -16,6 +18,8 @@ const BASIS: &str = include_str!("../../../../params/friction_basis.yaml");
 /// What a test with small files may hold, and one with the network (MB).
 const TEXT_MB: f64 = 200.0;
 const MODEL_MB: f64 = 800.0;
+/// One with pictures: the largest that a camera may have, 8192 x 8192, as colours (MB).
+const PICTURES_MB: f64 = 800.0;
 
 fn assert_held_at_most(most_mb: f64) {
     let peak_mb = peak_memory_mb();
@@ -132,6 +136,168 @@ fn what_has_no_end_is_not_read_to_its_end() {
         assert_named(&OnnxRuntime::load(&library, &path).unwrap_err(), &path);
     }
     assert_held_at_most(TEXT_MB);
+}
+
+/// What is made of a picture before the network sees it; whether it is one.
+fn looked_at(data: &FrameData<'_>, region: &Region) -> bool {
+    let picture = match decode(data, region) {
+        Ok(picture) => picture,
+        Err(error) => {
+            assert!(error.to_string().len() < 4000, "{error:.200}");
+            return false;
+        }
+    };
+    assert_eq!(picture.data.len(), (picture.width * picture.height * 3) as usize);
+    let seen = Preprocessor::default().resize(&picture).unwrap();
+    let quality = QualityStatistics::measure(&seen);
+    assert!((0.0..=255.0).contains(&quality.mean) && (0.0..=1.0).contains(&quality.dark), "{quality:?}");
+    assert!(appearance(&seen, [0.5, 0.5]).iter().all(|figure| figure.is_finite()));
+    true
+}
+
+/// Pixels with edges and colours.
+fn pixels(side: u32, channels: u32) -> Vec<u8> {
+    (0..side * side * channels)
+        .map(|k| (k.wrapping_mul(2_654_435_761) >> 25) as u8 + (k % 97) as u8)
+        .collect()
+}
+
+/// Pictures as cameras and stacks compress them: JPEG, and PNG in four kinds of pixels.
+fn compressed() -> Vec<Vec<u8>> {
+    use image::{ExtendedColorType, ImageEncoder as _};
+    let side = 64;
+    let png = |channels: u32, kind: ExtendedColorType| {
+        let mut bytes = Vec::new();
+        let encoder = image::codecs::png::PngEncoder::new(&mut bytes);
+        encoder.write_image(&pixels(side, channels), side, side, kind).unwrap();
+        bytes
+    };
+    let mut jpeg = Vec::new();
+    let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut jpeg, 80);
+    encoder.encode(&pixels(side, 3), side, side, ExtendedColorType::Rgb8).unwrap();
+    let mut grey = Vec::new();
+    let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut grey, 40);
+    encoder.encode(&pixels(side, 1), side, side, ExtendedColorType::L8).unwrap();
+    vec![
+        jpeg,
+        grey,
+        png(3, ExtendedColorType::Rgb8),
+        png(1, ExtendedColorType::L8),
+        png(4, ExtendedColorType::Rgba8),
+        png(2, ExtendedColorType::L16),
+    ]
+}
+
+/// Makes the checksums of a PNG file's parts right again: without, its reader looks no further.
+fn with_checksums(bytes: &mut [u8]) {
+    let mut at = 8;
+    while let Some(head) = bytes.get(at..at + 8) {
+        let length = u32::from_be_bytes([head[0], head[1], head[2], head[3]]) as usize;
+        let Some(end) = at.checked_add(8 + length).filter(|end| *end + 4 <= bytes.len()) else { return };
+        let sum = crc(&bytes[at + 4..end]);
+        bytes[end..end + 4].copy_from_slice(&sum.to_be_bytes());
+        at = end + 4;
+    }
+}
+
+fn crc(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(u32::MAX, |sum, byte| {
+        (0..8).fold(sum ^ u32::from(*byte), |sum, _| (sum >> 1) ^ (0xedb8_8320 & (sum & 1).wrapping_neg()))
+    })
+}
+
+/// Most of them end as they did, for a file without its end is refused before it is read.
+#[test]
+fn a_mutated_picture_is_refused_or_looked_at() {
+    let files = compressed();
+    let (mut mutants, mut refused, start) = (Mutants::new(0x9176), 0, Instant::now());
+    let count = Mutants::count(1200);
+    for k in 0..count {
+        let file = &files[k % files.len()];
+        assert!(k >= files.len() || looked_at(&FrameData::Compressed(file), &Region::WHOLE));
+        let mut bytes = mutants.binary(file, 0, [80, 400, usize::MAX][k % 3]);
+        if mutants.below(4) > 0 {
+            bytes.extend(&file[file.len() - 12..]);
+        }
+        if mutants.below(4) > 0 {
+            with_checksums(&mut bytes);
+        }
+        refused += usize::from(!looked_at(&FrameData::Compressed(&bytes), &Region::WHOLE));
+    }
+    println!("pictures (JPEG, PNG): {count} mutants in {:.1?}, {refused} refused", start.elapsed());
+    assert!(refused > count / 4 && refused < count);
+    assert_held_at_most(PICTURES_MB);
+}
+
+/// Few bytes that claim, and hold, pictures larger than any camera's.
+#[test]
+fn a_picture_without_measure_is_refused() {
+    use image::{ExtendedColorType, ImageEncoder as _};
+    let mut large = Vec::new();
+    let encoder = image::codecs::png::PngEncoder::new(&mut large);
+    encoder.write_image(&vec![0; 12_000 * 12_000], 12_000, 12_000, ExtendedColorType::L8).unwrap();
+    assert!(!looked_at(&FrameData::Compressed(&large), &Region::WHOLE));
+    for file in compressed() {
+        let is_png = file.starts_with(b"\x89PNG");
+        // Where each of the two says how large it is: IHDR, and SOF0 behind its marker, length and precision.
+        let at =
+            if is_png { Some(16) } else { file.windows(2).position(|w| w == [0xff, 0xc0]).map(|at| at + 5) };
+        let mut claims = file.clone();
+        let (at, size): (usize, &[u8]) = (at.unwrap(), if is_png { &[0x7f; 8] } else { &[0xff; 4] });
+        claims[at..at + size.len()].copy_from_slice(size);
+        with_checksums(&mut claims);
+        assert!(!looked_at(&FrameData::Compressed(&claims), &Region::WHOLE));
+    }
+    assert_held_at_most(PICTURES_MB);
+}
+
+#[test]
+fn a_raw_picture_of_any_shape_is_refused_or_looked_at() {
+    const ENCODINGS: [&str; 17] = [
+        "rgb8",
+        "bgr8",
+        "rgba8",
+        "bgra8",
+        "mono8",
+        "mono16",
+        "8UC1",
+        "8UC3",
+        "16UC1",
+        "yuv422",
+        "yuv422_yuy2",
+        "bayer_rggb8",
+        "bayer_gbrg16",
+        "bayer_",
+        "bayer_8",
+        "",
+        "32FC1",
+    ];
+    const SIZES: [u32; 12] = [0, 1, 2, 3, 7, 31, 32, 33, 8192, 8193, 1 << 31, u32::MAX];
+    let data = pixels(64, 4);
+    let (mut mutants, mut refused, start) = (Mutants::new(0x7a3), 0, Instant::now());
+    let count = Mutants::count(4000);
+    for _ in 0..count {
+        let mut size = || match mutants.below(3) {
+            0 => SIZES[mutants.below(SIZES.len())],
+            _ => mutants.below(40) as u32,
+        };
+        let [width, height, padding] = [size(), size(), size()];
+        let step = match mutants.below(2) {
+            0 => padding,
+            _ => width.wrapping_mul([1, 2, 3, 4][mutants.below(4)]).wrapping_add(padding % 8),
+        };
+        let data = &data[..mutants.below(data.len() + 1)];
+        let edges = [0; 2].map(|_| mutants.below(90) as f64 / 100.0);
+        let span = [0; 2].map(|_| (1 + mutants.below(100)) as f64 / 100.0);
+        let region =
+            Region::new(edges[0], edges[1], (edges[0] + span[0]).min(1.0), (edges[1] + span[1]).min(1.0));
+        let encoding = ENCODINGS[mutants.below(ENCODINGS.len())];
+        let raw = RawPicture { width, height, step, encoding, big_endian: mutants.below(2) == 0, data };
+        refused += usize::from(!looked_at(&FrameData::Raw(raw), &region.unwrap()));
+    }
+    println!("raw pictures: {count} shapes in {:.1?}, {refused} refused", start.elapsed());
+    assert!(refused > count / 4 && refused < count);
+    assert_held_at_most(PICTURES_MB);
 }
 
 fn library() -> Option<PathBuf> {
