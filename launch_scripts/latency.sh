@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Latency from a sample to its live residual at 200 Hz, and from SIGINT to the end, seen by a CycloneDDS peer. Needs a set-up tree.
-# Usage: launch_scripts/latency.sh [--seconds S] [--hz HZ] [--ends N] [--bin FOLDER]
+# Latency from a sample to its live residual at 200 Hz, and from SIGINT to the end, seen by a peer on CycloneDDS or
+# Fast DDS. Needs a tree that is set up for the tests (launch_scripts/setup.sh --tests).
+# Usage: launch_scripts/latency.sh [--peer cyclonedds|fastdds] [--seconds S] [--hz HZ] [--ends N] [--bin FOLDER]
 set -euo pipefail
 cd "$(dirname "$0")/.."
 folder=${CARGO_TARGET_DIR:-target}/release

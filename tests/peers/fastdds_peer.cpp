@@ -2,15 +2,21 @@
 //
 //     fastdds_peer TOPIC COUNT TIMEOUT_S        subscribes to gripsight_msgs/msg/PacejkaParams, reliable and latched
 //     fastdds_peer get NODE PARAMETER TIMEOUT_S  asks a node for an integer parameter, as rmw_fastrtps does
+//     fastdds_peer play HZ SECONDS READERS ANSWERS TYPE (TOPIC TYPE FILE)...
+//         writes prepared messages, best effort, over and over, and times the answers that bear their stamps; see `play`
 //
 // Prints `ready`, then one line of JSON per message, with the field names of the .msg file. Exit code 1: not all messages
-// came in time. Build: c++ -std=c++14 fastdds_peer.cpp -lfastrtps -lfastcdr
+// came in time. Build: c++ -std=c++14 fastdds_peer.cpp -pthread -lfastrtps -lfastcdr
 
+#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <iomanip>
 #include <iostream>
+#include <map>
+#include <mutex>
 #include <sstream>
 #include <string>
 #include <thread>
@@ -258,14 +264,150 @@ bool get(const std::string& node, const std::string& parameter, int timeout_s) {
     return false;
 }
 
+double now_s() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+// The type's name as DDS has it: gripsight_msgs/msg/Residual is gripsight_msgs::msg::dds_::Residual_.
+std::string mangled(const std::string& name) {
+    const size_t package = name.find('/'), type = name.rfind('/');
+    return name.substr(0, package) + "::" + name.substr(package + 1, type - package - 1) + "::dds_::" + name.substr(type + 1) + "_";
+}
+
+// A file of prepared messages (their length in four bytes, then CDR with its encapsulation and a header first), and their writer.
+struct Source {
+    DataWriter* writer;
+    std::vector<std::vector<char>> messages;
+
+    Source(DomainParticipant* participant, const std::string& name, const std::string& type, const char* path) {
+        std::ifstream file(path, std::ios::binary);
+        for (uint32_t length; file.read(reinterpret_cast<char*>(&length), 4);) {
+            messages.emplace_back(length);
+            file.read(messages.back().data(), length);
+        }
+        DataWriterQos qos;
+        qos.reliability().kind = BEST_EFFORT_RELIABILITY_QOS;
+        qos.history().depth = 50;
+        qos.endpoint().history_memory_policy = eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+        writer = participant->create_publisher(PUBLISHER_QOS_DEFAULT)
+                     ->create_datawriter(topic(participant, "rt" + name, mangled(type).c_str()), qos);
+    }
+
+    void write(uint64_t index, int64_t stamp_ns) {
+        auto& message = messages[index % messages.size()];
+        const int32_t seconds = stamp_ns / 1000000000;
+        const uint32_t rest = stamp_ns % 1000000000;
+        std::memcpy(message.data() + 4, &seconds, 4);
+        std::memcpy(message.data() + 8, &rest, 4);
+        writer->write(&message);
+    }
+};
+
+// Writes a message of each topic at each step, stamped every 1 / HZ s; the last topic's is timed against the answer that bears its stamp. Starts
+// once every topic has READERS readers, counts from the first answer on (which has a minute to come), for SECONDS. Prints `first S`, then
+// a line `LATE_S` of each step before it, `LATE_S WRITTEN_S ARRIVED_S` of each counted one, - for what never arrived.
+bool play(double hz, double seconds, int readers, const std::string& answers, const std::string& type, char** sources, int count) {
+    const double discovery_s = 20.0, prepared_s = 60.0, tail_s = 1.0;
+    DomainParticipant* participant = join();
+    std::vector<Source> topics;
+    for (int k = 0; k + 2 < count; k += 3) topics.emplace_back(participant, sources[k], sources[k + 1], sources[k + 2]);
+    for (const Source& each : topics)
+        if (each.messages.empty()) return false;
+    DataReader* reads = reader(participant, topic(participant, "rt" + answers, mangled(type).c_str()), VOLATILE_DURABILITY_QOS);
+    std::cout << "ready" << std::endl;
+
+    const auto is_heard = [&](const Source& each) {
+        PublicationMatchedStatus status;
+        each.writer->get_publication_matched_status(status);
+        return status.current_count >= readers;
+    };
+    for (const Source& each : topics) {
+        for (const double end = now_s() + discovery_s; !is_heard(each);) {
+            if (now_s() > end) return false;
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        }
+    }
+
+    std::map<int64_t, double> arrived;
+    std::mutex lock;
+    std::atomic<bool> any{false}, running{true};
+    std::thread listener([&] {
+        while (running) {
+            if (!reads->wait_for_unread_message({0, 100000000})) continue;
+            std::vector<char> sample;
+            SampleInfo info;
+            while (reads->take_next_sample(&sample, &info) == ReturnCode_t::RETCODE_OK) {
+                const double at = now_s();
+                if (!info.valid_data || sample.size() < 12) continue;
+                int32_t whole;
+                uint32_t rest;
+                std::memcpy(&whole, sample.data() + 4, 4);
+                std::memcpy(&rest, sample.data() + 8, 4);
+                std::lock_guard<std::mutex> held(lock);
+                arrived.emplace(int64_t{whole} * 1000000000 + rest, at);
+                any = true;
+            }
+        }
+    });
+
+    struct Step {
+        int64_t stamp_ns;
+        double late_s, written_s;
+        bool counts;
+    };
+    std::vector<Step> steps;
+    const auto begun = std::chrono::steady_clock::now();
+    const double begun_s = now_s();
+    const int64_t begun_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
+        std::chrono::system_clock::now().time_since_epoch()).count();
+    double end_s = 0.0;
+    bool is_done = true;
+    for (uint64_t index = 0; end_s == 0.0 || now_s() < end_s; ++index) {
+        const double due_s = index / hz;
+        std::this_thread::sleep_until(begun + std::chrono::nanoseconds(static_cast<int64_t>(1e9 * due_s)));
+        const double late_s = now_s() - begun_s - due_s;
+        const int64_t stamp_ns = begun_ns + static_cast<int64_t>(1e9 * due_s);
+        for (size_t k = 0; k + 1 < topics.size(); ++k) topics[k].write(index, stamp_ns);
+        const double written_s = now_s();
+        topics.back().write(index, stamp_ns);
+        if (any && end_s == 0.0) {
+            end_s = now_s() + seconds;
+            std::cout << "first " << now_s() - begun_s << std::endl;
+        }
+        if (end_s == 0.0 && due_s > prepared_s) {
+            is_done = false;
+            break;
+        }
+        steps.push_back({stamp_ns, late_s, written_s, end_s > 0.0});
+    }
+    std::this_thread::sleep_for(std::chrono::duration<double>(tail_s));
+    running = false;
+    listener.join();
+    std::cout << std::fixed << std::setprecision(9);
+    for (const Step& step : steps) {
+        std::cout << step.late_s;
+        if (step.counts) {
+            const auto answer = arrived.find(step.stamp_ns);
+            std::cout << ' ' << step.written_s << ' ';
+            if (answer == arrived.end()) std::cout << '-';
+            else std::cout << answer->second;
+        }
+        std::cout << '\n';
+    }
+    return is_done;
+}
+
 int main(int argc, char** argv) {
     bool done = false;
-    if (argc == 4) {
+    if (argc >= 10 && argc % 3 == 1 && std::string(argv[1]) == "play") {
+        done = play(std::atof(argv[2]), std::atof(argv[3]), std::atoi(argv[4]), argv[5], argv[6], argv + 7, argc - 7);
+    } else if (argc == 4) {
         done = subscribe(argv[1], std::atoi(argv[2]), std::atoi(argv[3]));
     } else if (argc == 5 && std::string(argv[1]) == "get") {
         done = get(argv[2], argv[3], std::atoi(argv[4]));
     } else {
-        std::cerr << "usage: fastdds_peer TOPIC COUNT TIMEOUT_S | get NODE PARAMETER TIMEOUT_S\n";
+        std::cerr << "usage: fastdds_peer TOPIC COUNT TIMEOUT_S | get NODE PARAMETER TIMEOUT_S\n"
+                     "       | play HZ SECONDS READERS ANSWERS TYPE (TOPIC TYPE FILE)...\n";
         return 2;
     }
     // The process ends here: tearing the entities down one by one would only take time.

@@ -59,7 +59,7 @@ pub fn fast_dds() -> Found {
     build("fastdds_peer", "fastdds_peer.cpp", |folder, source, program| {
         let libraries = ["-lfastrtps", "-lfastcdr"];
         let mut compiler = Command::new("c++");
-        compiler.args(["-std=c++14", "-O1"]).args(from_to(source, program));
+        compiler.args(["-std=c++14", "-O1", "-pthread"]).args(from_to(source, program));
         finish(compiler.args(unpacked_without_root()).args(libraries).current_dir(folder))
     })
 }

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
+use byteorder::LittleEndian;
 use gripsight_msgs::standard::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
+use gripsight_msgs::standard::nav_msgs::Odometry;
 use gripsight_msgs::standard::rcl_interfaces::Log;
 use gripsight_msgs::{PacejkaParams, StateSequence};
 use gripsight_tests::domain::Domain;
@@ -202,6 +204,37 @@ fn no_sample_of_a_peer_is_lost() {
         assert_eq!(received["twist"]["twist"]["linear"]["x"], expected["twist"]["twist"]["linear"]["x"]);
     }
     assert!(publisher.wait(PATIENCE).success());
+}
+
+/// Fast DDS writes what the node hears, and hears what it answers; `launch_scripts/latency.sh` stands on it.
+#[test]
+fn fast_dds_writes_and_hears_the_answers() {
+    let fast_dds = fast_dds();
+    if !available(std::slice::from_ref(&fast_dds)) {
+        return;
+    }
+    let domain = Domain::new();
+    let _node = source(&domain, &[]);
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let mut message = vec![0, 1, 0, 0];
+    message.extend(cdr_encoding::to_vec::<_, LittleEndian>(&Odometry::default()).unwrap());
+    let length = u32::try_from(message.len()).unwrap().to_le_bytes();
+    std::fs::write(file.path(), [&length[..], &message].concat()).unwrap();
+    let odometry = "nav_msgs/msg/Odometry";
+    let answered = ["1", "/result_source/echo", odometry];
+    let mut peer = std::process::Command::new(fast_dds.unwrap());
+    peer.args(["play", "100", "2"]).args(answered).args(["/odom", odometry]).arg(file.path());
+    let output = peer.envs(domain.environment()).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success(), "{text}");
+    let timed: Vec<Vec<&str>> = text
+        .lines()
+        .map(|line| line.split(' ').collect())
+        .filter(|words: &Vec<_>| words.len() == 3)
+        .collect();
+    let lost = timed.iter().filter(|words| words[2] == "-").count();
+    // Best effort, on a machine that may be busy.
+    assert!(timed.len() >= 150 && 2 * lost < timed.len(), "{lost} of {} lost", timed.len());
 }
 
 #[test]
