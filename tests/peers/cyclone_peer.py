@@ -8,6 +8,7 @@
     cyclone_peer.py types TOPIC TYPE [--count N]        the types that endpoints of a topic are announced with, once N endpoints stand and
                                                         none has come for two seconds; exit code 1: others than TYPE
     cyclone_peer.py user_data TOPIC TYPE [--count N]    the user data that they are announced with
+    cyclone_peer.py quality TOPIC TYPE [--count N]      their reliability and durability
 
 Messages are printed as JSON lines, one object each, with the field names of the .msg files; the line `ready` says that the
 endpoint stands. Exit code 1: not all messages came in time.
@@ -191,6 +192,13 @@ def user_data(participant, args):
     return is_settled
 
 
+def quality(participant, args):
+    is_settled, found = endpoints(participant, args)
+    names = [(type(end.qos[Policy.Reliability]).__name__, type(end.qos[Policy.Durability]).__name__) for end in found]
+    print(json.dumps(sorted(set(names))), flush=True)
+    return is_settled
+
+
 def service(participant, args):
     """The topics of requests and replies."""
     package, name = args.type.split("/srv/")
@@ -246,7 +254,7 @@ def call(participant, args):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("command", choices=["subscribe", "publish", "call", "serve", "types", "user_data"])
+    parser.add_argument("command", choices=["subscribe", "publish", "call", "serve", "types", "user_data", "quality"])
     parser.add_argument("topic")
     parser.add_argument("type")
     parser.add_argument("request", nargs="?")
@@ -257,7 +265,7 @@ def main():
     parser.add_argument("--stamp", action="store_true")
     parser.add_argument("--timeout", type=float, default=50.0)
     args = parser.parse_args()
-    commands = (subscribe, publish, call, serve, types, user_data)
+    commands = (subscribe, publish, call, serve, types, user_data, quality)
     work = next(command for command in commands if command.__name__ == args.command)
     sys.exit(0 if work(DomainParticipant(int(os.environ.get("ROS_DOMAIN_ID", 0))), args) else 1)
 

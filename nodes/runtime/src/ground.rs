@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use ros2_client::{Context, MessageTypeName, Name, NodeName, NodeOptions, ros2};
-use rustdds::DomainParticipantBuilder;
+use rustdds::policy::{Durability, History};
+use rustdds::{DomainParticipantBuilder, QosPolicies, QosPolicyBuilder};
 
 use crate::args::Args;
 use crate::environment::Environment;
@@ -48,12 +49,25 @@ pub(crate) fn overrides(args: &Args, name: &str, identity: &Identity) -> Result<
 
 pub(crate) fn context(environment: &Environment) -> Result<Context, Error> {
     rustdds::discovery::set_endpoint_user_data(user_data);
+    rustdds::dds::set_topic_qos(other_qos);
     let mut builder = DomainParticipantBuilder::new(environment.domain_id);
     if environment.localhost_only {
         builder = builder.with_only_networks([std::net::Ipv4Addr::LOCALHOST]);
     }
     let participant = builder.build().map_err(|error| Error::create("DDS participant", error))?;
     Context::from_domain_participant(participant).map_err(|error| Error::create("ROS 2 context", error))
+}
+
+/// The quality of service of what ros2-client 0.12.1 creates otherwise than ROS 2 does: it keeps one parameter event for those who join later,
+/// which makes a recorder that meets it first ask for as much of nodes that have nothing to give. Source: `rmw_qos_profile_parameter_events`.
+fn other_qos(dds_topic: &str) -> Option<QosPolicies> {
+    (dds_topic == "rt/parameter_events").then(|| {
+        QosPolicyBuilder::new()
+            .durability(Durability::Volatile)
+            .reliable(rustdds::Duration::ZERO)
+            .history(History::KeepLast { depth: 1000 })
+            .build()
+    })
 }
 
 /// The ros2-client node, without the services that this crate supplies itself.

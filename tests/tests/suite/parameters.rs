@@ -105,6 +105,21 @@ fn a_change_is_told_with_the_parameter_s_own_type() {
     assert_eq!(changed["value"]["double_value"], 3.0);
 }
 
+/// As ROS 2 has it. A recorder that meets a writer which keeps events for those who join later asks all others for as much, and hears nothing of them.
+#[test]
+fn events_are_offered_to_those_who_are_there() {
+    let Ok(python) = cyclone() else {
+        available(&[cyclone()]);
+        return;
+    };
+    let domain = Domain::new();
+    let arguments = ["quality", "/parameter_events", "rcl_interfaces/msg/ParameterEvent", "--timeout", "25"];
+    let mut peer = start_cyclone(&domain, &python, &arguments);
+    let _node = source(&domain, &[]);
+    assert_eq!(message::<Value>(&peer), json!([["Reliability.Reliable", "Durability.Volatile"]]));
+    assert!(peer.wait(PATIENCE).success());
+}
+
 #[test]
 fn a_name_that_the_node_does_not_have_is_found_in_its_file() {
     let domain = Domain::new();

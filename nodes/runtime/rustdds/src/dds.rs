@@ -11,6 +11,7 @@ pub(crate) mod ddsdata;
 pub(crate) mod pubsub;
 pub(crate) mod readcondition;
 pub(crate) mod topic;
+mod topic_qos;
 pub(crate) mod typedesc;
 
 pub mod result;
@@ -19,6 +20,8 @@ pub use result::{
 };
 
 // Public interface
+
+pub use topic_qos::set_topic_qos;
 
 /// DDS Quality of Service policies
 pub mod qos;

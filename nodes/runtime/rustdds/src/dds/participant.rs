@@ -30,6 +30,7 @@ use crate::{
       sync_status_channel, DomainParticipantStatusEvent, StatusChannelReceiver, StatusChannelSender,
     },
     topic::*,
+    topic_qos::topic_qos,
     typedesc::TypeDesc,
   },
   discovery::{
@@ -1537,6 +1538,8 @@ impl DomainParticipantInner {
     qos: &QosPolicies,
     topic_kind: TopicKind,
   ) -> CreateResult<Topic> {
+    let other_qos = topic_qos(&name);
+    let qos = other_qos.as_ref().unwrap_or(qos);
     #[cfg(feature = "security")]
     if let Some(sec_handle) = self.security_plugins_handle.as_ref() {
       // Security is enabled.
