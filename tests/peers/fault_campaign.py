@@ -218,9 +218,10 @@ class Run:
         elif kind == "second identifier":
             self.node("identifier_2", "identifier")
         else:
-            self.node("listener", "s4_residual", ["-r", "__node:=listener"])
+            listener = f"listener_{len(self.processes)}"
+            self.node(listener, "s4_residual", ["-r", f"__node:={listener}"])
             time.sleep(0.3)
-            self.processes["listener"].send_signal(signal.SIGSTOP)
+            self.processes[listener].send_signal(signal.SIGSTOP)
 
     def play(self):
         rng = random.Random(self.seed)
@@ -307,9 +308,9 @@ class Run:
 
     def end(self):
         """Ends all by SIGINT; the time that the slowest took, infinite where one had to be killed."""
-        if "listener" in self.processes:
+        for listener in [name for name in self.processes if name.startswith("listener")]:
             # It stands still, so only this ends it.
-            self.processes.pop("listener").kill()
+            self.processes.pop(listener).kill()
         start = time.monotonic()
         alive = [process for process in self.processes.values() if process.poll() is None]
         for process in alive:

@@ -10,11 +10,12 @@ use serde_json::Value;
 pub(crate) fn notes(recorded: &Recorded) -> Vec<String> {
     let mut notes: Vec<String> = recorded.checks.disagreeing().map(ToString::to_string).collect();
     notes.extend(recorded.estimated.iter().map(ToString::to_string));
-    for kind in [BadKind::Outlier, BadKind::Frozen, BadKind::Jump] {
+    for kind in [BadKind::Outlier, BadKind::Burst, BadKind::Frozen, BadKind::Jump] {
         let spans: Vec<&BadSpan> = recorded.bad_samples.iter().filter(|b| b.kind == kind).collect();
         let Some(first) = spans.first() else { continue };
         let what = match kind {
             BadKind::Outlier => "single samples that stand out, left out",
+            BadKind::Burst => "stretches that no car's motion leads to, left out",
             BadKind::Frozen => "stretches over which a sensor repeated itself, left out",
             BadKind::Jump => "jumps of the localisation",
         };

@@ -1,6 +1,8 @@
 //! Bad samples cost themselves, not the bag: what of a sequence is not to be used, and why.
 //!
 //! * A single sample of v_x, v_y or yaw rate that stands out ([`Spikes`]' rule) is left out; of an optional channel it is bridged by its neighbours.
+//! * Samples of v_x, v_y or yaw rate that a jump no car makes leads to, and another leads back from within two seconds, are left out: seconds in other
+//!   units, a second source. At the ends of a sequence one such jump does.
 //! * A channel that repeats one value for over half a second while the car moves and then *jumps* was frozen: those samples are left out. One
 //!   that goes on from where it stood was constant (a simulator's cruise) or within its sensor's dead band, and stays.
 //! * A pose that jumps and stays is told; nothing is left out, since what uses poses uses their differences over short spans.
@@ -20,6 +22,8 @@ use crate::{DataHealth, SignalError, StateSequence};
 pub enum BadKind {
     /// A single sample that stands out from both its neighbours.
     Outlier,
+    /// Samples that no car's motion leads to and back from.
+    Burst,
     /// A sensor that repeated itself, and then jumped.
     Frozen,
     /// A localisation that jumped, and stayed there.
@@ -52,6 +56,11 @@ pub struct Masked {
 
 /// A step of this many usual steps is a jump.
 const JUMP_STEPS: f64 = 8.0;
+/// No car's speeds (m/s2) and yaw rate (rad/s2) change faster.
+const MOST_MPS2: f64 = 100.0;
+const MOST_RADPS2: f64 = 500.0;
+/// Longest burst (s).
+const MOST_BURST_S: f64 = 2.0;
 /// Where more than this share of the samples stand out, they are not single bad ones: none is left out.
 const MOST_SHARE: f64 = 0.2;
 
@@ -65,12 +74,17 @@ pub fn masked(sequence: &StateSequence) -> Result<Masked, SignalError> {
     let time_s: Vec<f64> = sequence.time_s.iter().map(|&t| f64::from(t)).collect();
     let mut keep = vec![true; sequence.len()];
     let moving = [
-        ("v_x_mps", &sequence.v_x_mps),
-        ("v_y_mps", &sequence.v_y_mps),
-        ("yaw_rate_radps", &sequence.yaw_rate_radps),
+        ("v_x_mps", &sequence.v_x_mps, MOST_MPS2),
+        ("v_y_mps", &sequence.v_y_mps, MOST_MPS2),
+        ("yaw_rate_radps", &sequence.yaw_rate_radps, MOST_RADPS2),
     ];
-    for (name, values) in moving {
+    for (name, values, most_rate) in moving {
         let values: Vec<f64> = values.iter().map(|&v| f64::from(v)).collect();
+        for (from, to, size) in bursts_at(&time_s, &values, most_rate) {
+            keep[from..=to].fill(false);
+            let (from_s, to_s) = (time_s[from], time_s[to]);
+            out.bad.push(BadSpan { channel: name, kind: BadKind::Burst, from_s, to_s, size });
+        }
         for (k, size) in spikes_at(&values) {
             keep[k] = false;
             out.bad.push(BadSpan {
@@ -87,7 +101,7 @@ pub fn masked(sequence: &StateSequence) -> Result<Masked, SignalError> {
         keep.fill(true);
         out.bad.clear();
     }
-    for (name, values) in moving {
+    for (name, values, _) in moving {
         let values: Vec<f64> = values.iter().map(|&v| f64::from(v)).collect();
         let usual = usual_step(&values);
         for (from, to) in still_spans(&time_s, &values, |k| sequence.v_x_mps[k].abs() > MOVING_MPS) {
@@ -154,6 +168,42 @@ fn jumps(sequence: &StateSequence, bad: &mut Vec<BadSpan>) {
             bad.push(BadSpan { channel: "x_m", kind: BadKind::Jump, from_s, to_s, size: step });
         }
     }
+}
+
+/// First and last places of bursts, and how high the jump is.
+fn bursts_at(time_s: &[f64], values: &[f64], most_rate: f64) -> Vec<(usize, usize, f64)> {
+    let least = JUMP_STEPS * usual_step(values);
+    let step = |k: usize| values[k] - values[k - 1];
+    let is_jump = |&k: &usize| step(k).abs() > least.max(most_rate * (time_s[k] - time_s[k - 1]));
+    let jumps: Vec<usize> = (1..values.len()).filter(is_jump).collect();
+    let is_short = |from: usize, to: usize| time_s[to] - time_s[from] <= MOST_BURST_S;
+    let mut found = Vec::new();
+    let mut at = 0;
+    while let Some(&k) = jumps.get(at) {
+        // Back to where it came from, as far as a jump goes: that of a burst which changes within itself may be another's.
+        let back = jumps[at + 1..].iter().position(|&j| {
+            is_short(k, j - 1)
+                && step(j) * step(k) < 0.0
+                && (values[j] - values[k - 1]).abs() < 0.25 * step(k).abs().max(step(j).abs())
+        });
+        match back {
+            Some(back) => {
+                let end = jumps[at + 1 + back];
+                if end > k + 1 {
+                    found.push((k, end - 1, step(k).abs()));
+                }
+                at += back + 1;
+            }
+            None if is_short(0, k - 1) && found.is_empty() => found.push((0, k - 1, step(k).abs())),
+            None if is_short(k, values.len() - 1) => {
+                found.push((k, values.len() - 1, step(k).abs()));
+                break;
+            }
+            None => {}
+        }
+        at += 1;
+    }
+    found
 }
 
 /// What 90 % of the steps from sample to sample stay below.
@@ -229,6 +279,28 @@ mod tests {
         assert!((out.sequence.a_y_mps2[499] - (4.0_f32 * 5.0).sin()).abs() < 0.01);
         let kinds: Vec<_> = out.bad.iter().map(|b| (b.channel, b.kind)).collect();
         assert_eq!(kinds, [("yaw_rate_radps", BadKind::Outlier), ("a_y_mps2", BadKind::Outlier)]);
+    }
+
+    #[test]
+    fn seconds_in_other_units_are_left_out_and_a_step_that_stays_is_not() {
+        let mut harmed = drive();
+        for k in 400..420 {
+            harmed.v_x_mps[k] *= 3.6;
+            harmed.yaw_rate_radps[k] *= 57.3;
+        }
+        let out = masked(&harmed).unwrap();
+        assert_eq!(out.sequence.len(), 980);
+        assert!(out.sequence.v_x_mps.iter().all(|v| *v < 7.0));
+        assert!(out.bad.iter().all(|b| b.kind == BadKind::Burst && b.from_s > 3.9 && b.to_s < 4.3));
+        // A window that begins, and one that ends, within such seconds.
+        for (from, to) in [(410, 1000), (0, 410)] {
+            let mut part = harmed.clone();
+            part.retain(|k| (from..to).contains(&k));
+            assert!(masked(&part).unwrap().sequence.v_x_mps.iter().all(|v| *v < 7.0), "{from} to {to}");
+        }
+        let mut stays = drive();
+        stays.v_x_mps[500..].iter_mut().for_each(|v| *v += 5.0);
+        assert_eq!(masked(&stays).unwrap(), Masked { sequence: stays, bad: Vec::new() });
     }
 
     #[test]
