@@ -23,9 +23,14 @@ const WATCH_PERIOD: Duration = Duration::from_secs(1);
 /// that was stopped and goes on: after Ctrl-Z and `fg`, beneath a debugger. Only a command that nobody takes any more shows it.
 pub(crate) async fn stopped(participant: rustdds::DomainParticipant) {
     let mut looks = tokio::time::interval(WATCH_PERIOD);
-    while participant.assert_liveliness().is_ok() {
+    while !is_stopped(&participant) {
         looks.tick().await;
     }
+}
+
+/// Whether DDS no longer runs.
+pub(crate) fn is_stopped(participant: &rustdds::DomainParticipant) -> bool {
+    participant.assert_liveliness().is_err()
 }
 
 /// Parameters from the files, then those of the command line, which win.

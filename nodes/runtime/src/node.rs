@@ -20,7 +20,7 @@ use crate::clock::Clock;
 use crate::diagnostics::Diagnostics;
 use crate::environment::{self, Environment};
 use crate::error::Error;
-use crate::ground::{context, overrides, ros_node, ros_topic, stopped};
+use crate::ground::{context, is_stopped, overrides, ros_node, ros_topic, stopped};
 use crate::guard::Guard;
 use crate::inputs::{self, Arrivals};
 use crate::logging;
@@ -266,6 +266,11 @@ impl Node {
             let participant = self.context.domain_participant();
             self.spawn(inputs::watch(needed, participant, self.domain_id, self.diagnostics.clone()));
         }
+    }
+
+    /// Whether DDS has stopped beneath it.
+    pub(crate) fn is_deaf(&self) -> bool {
+        is_stopped(&self.context.domain_participant())
     }
 
     /// Runs `work` until it ends, `end` resolves or DDS has stopped, then stops the node's own tasks in order.

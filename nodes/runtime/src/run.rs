@@ -59,7 +59,11 @@ where
     }
     let ended = runtime.block_on(async {
         let mut node = Node::start(name, std::env::args(), &guard)?;
-        let work = setup(&mut node)?;
+        let work = match setup(&mut node) {
+            // It was suspended while it set itself up.
+            Err(_) if node.is_deaf() => return Ok(Ended::Deaf),
+            work => work?,
+        };
         node.check_parameters()?;
         tracing::info!("{} has started in DDS domain {}", node.name(), node.domain());
         let beat = guard.beat();
