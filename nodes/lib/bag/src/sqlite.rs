@@ -67,10 +67,18 @@ impl SqliteMessages {
 
     fn fill(&mut self) -> Result<(), BagError> {
         let rows = page(&self.connection, self.last_id).map_err(|e| failure(&self.path, self.given, &e))?;
-        if let Some((id, ..)) = rows.last() {
-            self.last_id = *id;
+        for row in rows {
+            // A damaged tree gives rows that it was not asked for, for ever.
+            if row.0 <= self.last_id {
+                if self.page.is_empty() {
+                    let why = "it comes again: the file's tree is damaged".to_owned();
+                    return Err(BagError::Sqlite { path: self.path.clone(), message: row.0, why });
+                }
+                break;
+            }
+            self.last_id = row.0;
+            self.page.push_back(row);
         }
-        self.page = rows.into();
         Ok(())
     }
 

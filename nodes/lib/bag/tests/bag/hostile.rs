@@ -350,6 +350,15 @@ fn a_database_made_to_harm_is_refused() {
     assert!(peak_memory_mb().is_none_or(|mb| mb < MOST_MB), "{:?}", peak_memory_mb());
 }
 
+/// Found by the mutants: a tree whose rows come again and again.
+#[test]
+fn a_database_whose_rows_come_again_has_an_end() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("bag.db3");
+    fs::write(&path, include_bytes!("disordered.db3.zstd")).unwrap();
+    assert!(Bag::open(&path).unwrap().messages().any(|message| message.is_err()));
+}
+
 /// Few bytes that unpack to many: a message, a record in a chunk, a file.
 #[test]
 fn what_unpacks_without_measure_is_refused() {
