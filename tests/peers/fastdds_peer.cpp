@@ -32,6 +32,7 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/TopicDataType.hpp>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastrtps/utils/IPLocator.h>
 
 using namespace eprosima::fastdds::dds;
 using eprosima::fastrtps::rtps::SerializedPayload_t;
@@ -170,15 +171,25 @@ private:
     bool first_ = true;
 };
 
-// Loopback only, and no shared memory: the suite speaks UDP.
+// Loopback only, and no shared memory: the suite speaks UDP. With FASTDDS_PEER_AT the machine of that address is asked for its participants, too.
 DomainParticipant* join() {
     const char* domain = std::getenv("ROS_DOMAIN_ID");
     DomainParticipantQos qos;
     auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
-    udp->interfaceWhiteList.push_back("127.0.0.1");
+    const int id = domain ? std::atoi(domain) : 0;
+    if (const char* address = std::getenv("FASTDDS_PEER_AT")) {
+        for (int participant = 0; participant < 4; ++participant) {
+            eprosima::fastrtps::rtps::Locator_t at;
+            eprosima::fastrtps::rtps::IPLocator::setIPv4(at, address);
+            at.port = 7400 + 250 * id + 10 + 2 * participant;
+            qos.wire_protocol().builtin.initialPeersList.push_back(at);
+        }
+    } else {
+        udp->interfaceWhiteList.push_back("127.0.0.1");
+    }
     qos.transport().use_builtin_transports = false;
     qos.transport().user_transports.push_back(udp);
-    return DomainParticipantFactory::get_instance()->create_participant(domain ? std::atoi(domain) : 0, qos);
+    return DomainParticipantFactory::get_instance()->create_participant(id, qos);
 }
 
 Topic* topic(DomainParticipant* participant, const std::string& name, const char* type_name) {

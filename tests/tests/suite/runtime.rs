@@ -206,6 +206,16 @@ fn no_sample_of_a_peer_is_lost() {
     assert!(publisher.wait(PATIENCE).success());
 }
 
+/// A file of one message, as the Fast DDS peer plays it.
+fn prepared_odometry() -> tempfile::NamedTempFile {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let mut message = vec![0, 1, 0, 0];
+    message.extend(cdr_encoding::to_vec::<_, LittleEndian>(&Odometry::default()).unwrap());
+    let length = u32::try_from(message.len()).unwrap().to_le_bytes();
+    std::fs::write(file.path(), [&length[..], &message].concat()).unwrap();
+    file
+}
+
 /// Fast DDS writes what the node hears, and hears what it answers; `launch_scripts/latency.sh` stands on it.
 #[test]
 fn fast_dds_writes_and_hears_the_answers() {
@@ -215,11 +225,7 @@ fn fast_dds_writes_and_hears_the_answers() {
     }
     let domain = Domain::new();
     let _node = source(&domain, &[]);
-    let file = tempfile::NamedTempFile::new().unwrap();
-    let mut message = vec![0, 1, 0, 0];
-    message.extend(cdr_encoding::to_vec::<_, LittleEndian>(&Odometry::default()).unwrap());
-    let length = u32::try_from(message.len()).unwrap().to_le_bytes();
-    std::fs::write(file.path(), [&length[..], &message].concat()).unwrap();
+    let file = prepared_odometry();
     let odometry = "nav_msgs/msg/Odometry";
     let answered = ["1", "/result_source/echo", odometry];
     let mut peer = std::process::Command::new(fast_dds.unwrap());
@@ -326,4 +332,48 @@ fn enforced_security_stops_the_start() {
     let open = start("Permissive");
     open.wait_for_log("runs open", PATIENCE);
     open.wait_for_log("up as", PATIENCE);
+}
+
+/// The range LOCALHOST keeps others on the network from writing, whatever they do; with SUBNET the same stranger is heard.
+#[test]
+fn a_stranger_on_the_network_writes_to_no_node_of_this_machine_only() {
+    let fast_dds = fast_dds();
+    if !available(std::slice::from_ref(&fast_dds)) {
+        return;
+    }
+    let peer = fast_dds.unwrap();
+    let apart = || std::process::Command::new("unshare");
+    if !apart().args(["-n", "true"]).status().is_ok_and(|status| status.success()) {
+        eprintln!("SKIPPED: network namespaces need root");
+        return;
+    }
+    let file = prepared_odometry();
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/peers/stranger.sh");
+    let is_heard = |range: &str| {
+        let mut command = apart();
+        command.args(["-n", "bash", script, range]);
+        command.arg(gripsight_tests::process::program("result_source")).arg(&peer).arg(file.path());
+        let output = command.output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        assert!(text.starts_with("ready"), "{text}{}", String::from_utf8_lossy(&output.stderr));
+        output.status.success()
+    };
+    assert!(is_heard("SUBNET"));
+    assert!(!is_heard("LOCALHOST"));
+}
+
+/// Nodes of another domain neither hear nor are heard.
+#[test]
+fn a_peer_in_another_domain_hears_nothing() {
+    let Ok(python) = cyclone() else {
+        available(&[cyclone()]);
+        return;
+    };
+    let (domain, other) = (Domain::new(), Domain::new());
+    let _node = source(&domain, &[]);
+    let arguments = ["subscribe", "/result_source/sequence", SEQUENCE, "--timeout"];
+    let mut apart = start_cyclone(&other, &python, &[&arguments[..], &["5"]].concat());
+    let beside = start_cyclone(&domain, &python, &[&arguments[..], &["50"]].concat());
+    assert!(!message::<StateSequence>(&beside).time_s.is_empty());
+    assert!(!apart.wait(PATIENCE).success());
 }

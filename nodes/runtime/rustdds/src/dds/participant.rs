@@ -1326,6 +1326,15 @@ impl DomainParticipantInner {
 
     listeners.insert(USER_TRAFFIC_LISTENER_TOKEN, user_traffic_listener);
 
+    if only_networks
+      .as_ref()
+      .is_some_and(|networks| networks.iter().all(IpAddr::is_loopback))
+    {
+      listeners
+        .values_mut()
+        .for_each(UDPListener::hear_this_machine_only);
+    }
+
     // construct our own Locators
     let self_locators: HashMap<mio1::Token, Vec<Locator>> = listeners
       .iter()

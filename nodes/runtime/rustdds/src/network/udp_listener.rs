@@ -11,7 +11,7 @@ use bytes::{Bytes, BytesMut};
 use crate::{
   network::util::{
     build_ifindex_to_interface_map, get_local_multicast_ip_addrs_filtered,
-    get_local_multicast_locators, get_local_unicast_locators_filtered,
+    get_local_multicast_locators, get_local_unicast_locators_filtered, local_interface_table,
   },
   rtps::transmit::InterfaceSelector,
   serialization::padding_needed_for_alignment_4,
@@ -55,6 +55,8 @@ pub struct UDPListener {
   // Cached OS interface-index -> local interface map, used to resolve the
   // receiving interface reported by IP_PKTINFO. Built once at construction.
   ifindex_map: HashMap<u32, InterfaceSelector>,
+  // Where datagrams may come from beside the loopback; None: anywhere.
+  sources: Option<Vec<IpAddr>>,
 }
 
 impl Drop for UDPListener {
@@ -197,6 +199,7 @@ impl UDPListener {
       multicast_group: None,
       has_multicast_join: false,
       ifindex_map: build_ifindex_to_interface_map(),
+      sources: None,
     })
   }
 
@@ -262,6 +265,26 @@ impl UDPListener {
       multicast_group: Some(multicast_group),
       has_multicast_join: joined_multicast,
       ifindex_map: build_ifindex_to_interface_map(),
+      sources: None,
+    })
+  }
+
+  /// From now on drops what does not come from this machine. To announce only
+  /// its loopback address keeps no one from sending: the sockets hear on all.
+  pub fn hear_this_machine_only(&mut self) {
+    self.sources = Some(
+      local_interface_table()
+        .into_iter()
+        .map(|each| each.ip)
+        .collect(),
+    );
+  }
+
+  fn hears(&self, origin: &PacketOrigin) -> bool {
+    self.sources.as_ref().is_none_or(|known| {
+      origin
+        .source
+        .is_some_and(|source| source.ip().is_loopback() || known.contains(&source.ip()))
     })
   }
 
@@ -355,6 +378,10 @@ impl UDPListener {
           return messages;
         }
       };
+      if !self.hears(&origin) {
+        self.receive_buffer.clear();
+        continue;
+      }
       // Something was received.
       // The buffer length is still MAX_MESSAGE_SIZE, set before the receive so
       // the kernel had room to write into. Shrink it back to the number of bytes
