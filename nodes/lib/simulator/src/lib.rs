@@ -24,6 +24,7 @@ mod outcome;
 mod patch;
 mod plan;
 mod pool;
+mod ratio;
 mod ripple;
 mod round;
 mod search;

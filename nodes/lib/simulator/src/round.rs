@@ -29,10 +29,10 @@ pub(crate) struct Likely {
 }
 
 /// What a round goes on from.
-struct Ahead {
-    state: State,
-    active: Vec<usize>,
-    columns: Vec<Residuals>,
+pub(crate) struct Ahead {
+    pub(crate) state: State,
+    pub(crate) active: Vec<usize>,
+    pub(crate) columns: Vec<Residuals>,
 }
 
 impl Fitter<'_> {
@@ -61,6 +61,9 @@ impl Fitter<'_> {
                 fits.push(self.with(&ahead, *c, trial)?);
             }
         }
+        if ahead.active.is_empty() && least(&fits) > unexplained {
+            fits.extend(self.ratio(&ahead, &fits)?);
+        }
         let left = least(&fits);
         if !found.zoomed
             && left > unexplained.max(SLOW * before)
@@ -88,8 +91,9 @@ impl Fitter<'_> {
         found.compared = followed.iter().map(|(c, s)| (*c, s.training(layout))).collect();
         fits.sort_by(|a, b| a.state.training(layout).total_cmp(&b.state.training(layout)));
         let Some(best) = fits.first() else { return Ok(None) };
-        let alike: Vec<&Fitted> =
-            fits.iter().filter(|f| self.alike(&best.state.costs, &f.state.costs)).collect();
+        let is_alike =
+            |f: &&Fitted| f.sizes.len() == best.sizes.len() && self.alike(&best.state.costs, &f.state.costs);
+        let alike: Vec<&Fitted> = fits.iter().filter(is_alike).collect();
         let chosen = self.mendable(&alike).unwrap_or(best);
         // A limit that another one hides shows nothing once that is taken: here both are seen.
         let last = |f: &Fitted| f.members().last().copied();
@@ -120,7 +124,12 @@ impl Fitter<'_> {
     }
 
     /// A candidate fitted together with those found.
-    fn with(&self, ahead: &Ahead, candidate: usize, trial: &State) -> Result<Fitted, SimulatorError> {
+    pub(crate) fn with(
+        &self,
+        ahead: &Ahead,
+        candidate: usize,
+        trial: &State,
+    ) -> Result<Fitted, SimulatorError> {
         let together: Vec<usize> = ahead.active.iter().copied().chain([candidate]).collect();
         let known = together.iter().map(|&c| ahead.columns[c].clone()).collect();
         self.fit(trial, &together, self.learned(&ahead.state, trial, &together, known), STEPS)

@@ -44,6 +44,22 @@ fn one_change_is_found_with_its_size() {
 }
 
 #[test]
+fn a_ratio_is_told_from_the_tires_that_imitate_it() {
+    for (gain, c_front) in [(0.5, 60.0), (0.5, 48.0), (0.62, 48.0)] {
+        let mut car = TestCar::new();
+        car.steering_gain = gain;
+        let (named, passes, _) = found_in(&car, &[(0, c_front)], 3);
+        let of = |name: &str| named.iter().find(|n| n.0 == name).map(|n| n.1);
+        let ratio = of("steering_gain").unwrap_or_else(|| panic!("{gain} {c_front}: {named:?}"));
+        assert!((ratio + 1.0 - gain).abs() < 0.01, "{gain} {c_front}: {named:?}");
+        let changed = (c_front - 60.0).abs() > 1e-9;
+        assert_eq!(named.len(), 1 + usize::from(changed), "{gain} {c_front}: {named:?}");
+        assert!(!changed || of("simulator.c_front").is_some_and(|c| (c - c_front).abs() < 1.0), "{named:?}");
+        assert!(passes < 300, "{passes}");
+    }
+}
+
+#[test]
 fn a_grip_that_shows_only_where_it_is_reached_is_found() {
     for (grip, seed) in [(4.0, 1), (5.0, 2), (6.0, 3)] {
         let mut car = TestCar::new();
