@@ -15,8 +15,8 @@ const OF_RATIO: f64 = 0.8;
 const OF_OTHER: [f64; 3] = [0.25, 0.45, 0.7];
 
 impl Fitter<'_> {
-    /// The ratio fitted alone and, where that leaves more than noise, together with the best of the other fits, where that leaves much less than
-    /// either. Nothing where no factor explains most of the gap.
+    /// In the first round: the ratio fitted alone or, where that leaves more than noise, together with the best of the other fits. Nothing where that, too, leaves
+    /// more than noise: a ratio imitates tires and delays as well as they do it.
     ///
     /// # Errors
     /// What the simulator says.
@@ -27,13 +27,16 @@ impl Fitter<'_> {
             return Ok(Vec::new());
         };
         let alone = self.with(ahead, ratio, &trial)?;
+        let unexplained = UNEXPLAINED * self.residuals();
+        if cost(&alone.state) <= unexplained {
+            return Ok(vec![alone]);
+        }
         let best = fits.iter().min_by(|a, b| cost(&a.state).total_cmp(&cost(&b.state)));
         let Some((best, other)) = best.and_then(|f| Some((f, *f.members().last()?))) else {
-            return Ok(vec![alone]);
+            return Ok(Vec::new());
         };
-        let left = cost(&alone.state).min(cost(&best.state));
-        if other == ratio || left <= UNEXPLAINED * self.residuals() || self.rollouts() + FIT > MOST_ROLLOUTS {
-            return Ok(vec![alone]);
+        if other == ratio || self.rollouts() + FIT > MOST_ROLLOUTS {
+            return Ok(Vec::new());
         }
         let null = &ahead.state.point.values;
         let between = |c: usize, far: &State, share: f64| null[c] + share * (far.point.values[c] - null[c]);
@@ -46,15 +49,17 @@ impl Fitter<'_> {
             values
         });
         let trials = self.trials(&alone.state, &[], &values.collect::<Vec<_>>())?;
-        let Some(start) = trials.into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b))) else {
-            return Ok(vec![alone]);
+        let start = trials.into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
+        // Of two causes even a rough look leaves less than one of them fitted.
+        let Some(start) = start.filter(|s| cost(s) < cost(&alone.state).min(cost(&best.state))) else {
+            return Ok(Vec::new());
         };
-        let together: Vec<usize> = ahead.active.iter().copied().chain([other, ratio]).collect();
+        let together = [other, ratio];
         let known = together.iter().map(|&c| ahead.columns[c].clone()).collect();
         let columns = self.learned(&alone.state, &start, &together, known);
         let both = self.fit(&start, &together, columns, STEPS)?;
-        let is_both = cost(&both.state) < SLOW * left && both.least_margin() > 0.0;
-        Ok([alone].into_iter().chain(is_both.then_some(both)).collect())
+        let is_both = cost(&both.state) <= unexplained && both.least_margin() > 0.0;
+        Ok(is_both.then_some(both).into_iter().collect())
     }
 
     /// The steering's ratio at the best of some factors.

@@ -15,8 +15,8 @@ use crate::model::Residuals;
 
 /// Rollouts of the recording that a whole diagnosis may take; those that come at its end with a round before, with a fit before, and alone.
 pub(crate) const MOST_ROLLOUTS: f64 = 300.0;
-const LAST: f64 = 110.0;
-pub(crate) const FIT: f64 = 70.0;
+const LAST: f64 = 100.0;
+pub(crate) const FIT: f64 = 60.0;
 const FREE_TERMS: f64 = 30.0;
 /// Effects at most.
 pub(crate) const MOST_FOUND: usize = 3;
