@@ -1,6 +1,8 @@
 //! The simulator's file: how to start it, and how its channels relate to the recorded ones.
 
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -106,7 +108,7 @@ impl SimulatorFile {
     /// # Errors
     /// [`SimulatorError::Io`], [`SimulatorError::File`].
     pub fn read(path: &Path) -> Result<Self, SimulatorError> {
-        let text = std::fs::read_to_string(path).map_err(SimulatorError::io(path))?;
+        let text = text_of(path).map_err(SimulatorError::io(path))?;
         let home = path.parent().map(Path::to_owned).unwrap_or_default();
         Self::parse(&text, &home).map_err(|why| SimulatorError::File { path: path.to_owned(), why })
     }
@@ -163,9 +165,29 @@ impl SimulatorFile {
     }
 }
 
+/// A simulator's file and its parameter file are no longer (bytes).
+const MOST_TEXT: u64 = 16 << 20;
+
+/// A file's text.
+pub(crate) fn text_of(path: &Path) -> io::Result<String> {
+    let mut text = String::new();
+    // What is no plain file does not tell its length.
+    if File::open(path)?.take(MOST_TEXT + 1).read_to_string(&mut text)? as u64 > MOST_TEXT {
+        let error = format!("larger than {} MiB", MOST_TEXT >> 20);
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, error));
+    }
+    Ok(text)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_file_without_an_end_is_refused() {
+        let said = SimulatorFile::read(Path::new("/dev/zero")).unwrap_err().to_string();
+        assert!(said.contains("/dev/zero") && said.contains("larger than 16 MiB"), "{said}");
+    }
 
     #[test]
     fn a_file_names_what_is_wrong_with_it() {

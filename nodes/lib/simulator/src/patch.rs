@@ -8,6 +8,7 @@ use std::path::Path;
 
 use similar::TextDiff;
 
+use crate::file::text_of;
 use crate::{Description, SimulatorError, SimulatorFile};
 
 /// A patched parameter file.
@@ -39,7 +40,7 @@ pub fn patch(
     let mut changed = Vec::new();
     let path = file.parameter_path();
     let before = match &path {
-        Some(path) => std::fs::read_to_string(path).map_err(SimulatorError::io(path))?,
+        Some(path) => text_of(path).map_err(SimulatorError::io(path))?,
         None => String::new(),
     };
     let mut text = before.clone();
