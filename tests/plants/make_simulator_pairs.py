@@ -46,7 +46,7 @@ def build(kind, checkout):
     if kind == "f1tenth_gym":
         import f1tenth_gym_adapter as a
 
-        file = f"adapter: f1tenth_gym\noptions: {{checkout: '{checkout}'}}\n"
+        file = f"adapter: f1tenth_gym\noptions: {{checkout: '{checkout}', integrator: Euler}}\n"
         return a.F1tenthGym({k: a.DEFAULTS[k] for k in a.DEFAULTS}, a.load_dynamics(checkout), 0.01, "Euler"), file, 0.33, 0.9, 9.0
     if kind in ("slipx", "slipx_bicycle"):
         import slipx_adapter as a

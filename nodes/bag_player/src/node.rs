@@ -107,7 +107,7 @@ fn publishers(node: &mut Node, bag: &Bag, wanted: &[String]) -> anyhow::Result<P
             continue;
         }
         let is_latched = is_latched(topic);
-        let qos = if is_latched { Qos::latched() } else { Qos::reliable(DEPTH) };
+        let qos = if is_latched { Qos::latched() } else { Qos::reliable(DEPTH) }.patient();
         let publisher = node
             .raw_publisher(&topic.name, &topic.type_name, qos)
             .with_context(|| format!("topic {} of the bag", topic.name))?;

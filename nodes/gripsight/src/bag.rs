@@ -217,11 +217,7 @@ fn health_lines(health: &DataHealth) -> String {
         health.rate_hz,
         1e3 * health.jitter_s,
         100.0 * health.moving_share,
-        if health.recorded.is_empty() {
-            "the required ones only".to_owned()
-        } else {
-            health.recorded.join(", ")
-        }
+        if health.recorded.is_empty() { "none".to_owned() } else { health.recorded.join(", ") }
     );
     for gap in &health.gaps {
         let _ = writeln!(text, "  gap from {:.2} s to {:.2} s", gap.from_s, gap.to_s);

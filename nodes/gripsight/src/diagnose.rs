@@ -32,7 +32,7 @@ use crate::{Outcome, outputs};
 /// nobody has touched are explained together. With --simulator or --simulator-bag the model is your own simulator.
 ///
 /// DIR receives gap.json, report.html, timing.json and extended_model.yaml (the named effects with their parameters).
-/// Exit code 3: the data cannot tell.
+/// Exit code 3: the data cannot tell; with --simulator every verdict is an answer, 0.
 #[derive(Debug, Args)]
 #[command(after_help = names())]
 pub(crate) struct DiagnoseArgs {

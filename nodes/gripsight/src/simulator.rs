@@ -120,7 +120,21 @@ pub(crate) fn run(args: &DiagnoseArgs, simulator_file: &Path) -> anyhow::Result<
         let path = args.out.join(name);
         fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
     }
+    let patch_path = args.out.join(PATCH_FILE);
+    if said.diff.is_empty() && patch_path.exists() {
+        // One of an earlier run fits the parameter file no longer.
+        fs::remove_file(&patch_path).with_context(|| format!("cannot remove {}", patch_path.display()))?;
+    }
     print!("{}", simulator_text(&result, &said, &notes));
+    if let (false, Some(parameters)) = (said.diff.is_empty(), file.parameter_path()) {
+        let folder = parameters.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let patch = patch_path.canonicalize().unwrap_or(patch_path);
+        println!(
+            "next       (cd {} && patch -p1 < {}), and diagnose again",
+            folder.display(),
+            patch.display()
+        );
+    }
     let names: Vec<&str> = files.iter().map(|f| f.0).collect();
     println!("files      {} ({})", args.out.display(), names.join(", "));
     Ok(Outcome::Done)

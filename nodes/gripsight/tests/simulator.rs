@@ -67,6 +67,9 @@ fn a_simulator_of_ones_own_is_diagnosed_as_the_page_says() {
     let (code, _, error) =
         gripsight(folder, "simulate --duration 20 --seed 5 --effect steering_delay=0.06 --out run.mcap");
     assert_eq!(code, 0, "{error}");
+    // Of an earlier run, which must not be taken for this one's.
+    fs::create_dir(folder.join("result")).unwrap();
+    fs::write(folder.join("result/simulator.patch"), "old").unwrap();
     let (code, said, error) = gripsight(folder, "diagnose run.mcap --simulator simulator.yaml --out result");
     assert_eq!(code, 0, "{error}");
     let gap: Value =
@@ -83,6 +86,9 @@ fn a_simulator_of_ones_own_is_diagnosed_as_the_page_says() {
             "{patch}"
         );
         assert!(gap["patch"]["verified"].as_f64().unwrap() < nominal.as_f64().unwrap());
+        assert!(said.contains("patch -p1 <"), "{said}");
+    } else {
+        assert!(!said.contains("patch -p1 <"), "{said}");
     }
 }
 

@@ -28,7 +28,7 @@ use crate::names::Identity;
 use crate::parameter_client::ParameterClient;
 use crate::parameter_services::{ParameterServices, RepliesRead, serve_trigger};
 use crate::parameters::{Descriptor, Parameter, ParameterStore};
-use crate::publisher::{PATIENCE, Publisher, REPLAY_PATIENCE, RawCdr, RawPublisher};
+use crate::publisher::{Publisher, RawCdr, RawPublisher};
 use crate::qos::Qos;
 use crate::readers::Readers;
 use crate::subscription::{Subscription, forward};
@@ -193,7 +193,7 @@ impl Node {
     /// # Errors
     /// [`Error::Name`], or [`Error::Create`] when DDS refuses.
     pub fn publisher<M: Message>(&mut self, topic: &str, qos: Qos) -> Result<Publisher<M>, Error> {
-        let raw = RawPublisher { patience: PATIENCE, ..self.raw_publisher(topic, M::TYPE, qos)? };
+        let raw = self.raw_publisher(topic, M::TYPE, qos)?;
         Ok(Publisher { raw, kind: PhantomData })
     }
 
@@ -209,7 +209,7 @@ impl Node {
             .map_err(|error| Error::create(format!("publisher of {topic}"), error))?;
         let (readers, diagnostics) = (self.readers.clone(), self.diagnostics.clone());
         let is_full = AtomicBool::new(false);
-        Ok(RawPublisher { topic, writer, readers, diagnostics, patience: REPLAY_PATIENCE, is_full })
+        Ok(RawPublisher { topic, writer, readers, diagnostics, patience: qos.patience(), is_full })
     }
 
     /// Subscribes to messages of type `M` on a topic (relative, `~/` private, or absolute).

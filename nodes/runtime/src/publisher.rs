@@ -15,10 +15,6 @@ use serde::ser::{Serialize, SerializeTuple, Serializer};
 use crate::diagnostics::Diagnostics;
 use crate::readers::Readers;
 
-/// A message waits this long for room; RustDDS 0.15.1 looks at its own limit only when there is room.
-pub(crate) const PATIENCE: Duration = Duration::from_secs(1);
-/// And a bag's message, of which none shall be lost: longer than it takes to notice that a reader has died (20 s with Fast DDS).
-pub(crate) const REPLAY_PATIENCE: Duration = Duration::from_secs(30);
 /// Where the last message waited in vain the next one waits so much less: a reader that never makes room shall not slow the loop message by
 /// message.
 const IMPATIENT: u32 = 100;
@@ -49,6 +45,7 @@ pub struct RawPublisher {
     pub(crate) writer: ros2_client::Publisher<RawCdr>,
     pub(crate) readers: Readers,
     pub(crate) diagnostics: Diagnostics,
+    /// A message waits this long for room; RustDDS 0.15.1 looks at its own limit only when there is room.
     pub(crate) patience: Duration,
     /// The last message found no room.
     pub(crate) is_full: AtomicBool,
@@ -60,9 +57,9 @@ impl RawPublisher {
         &self.topic
     }
 
-    /// Publishes a message: its CDR (little-endian) without the encapsulation header. Waits, for half
-    /// a minute at most, while a reliable reader has not yet acknowledged enough of what was sent
-    /// before. A message that could not be sent shows in the diagnostics.
+    /// Publishes a message: its CDR (little-endian) without the encapsulation header. Waits, for as long as
+    /// its [`Qos`](crate::Qos) has patience, while a reliable reader has not yet acknowledged enough of what was sent
+    /// before; one that acknowledges nothing then loses the oldest. A message that could not be sent shows in the diagnostics.
     pub async fn publish(&self, body: Vec<u8>) {
         let is_full = self.is_full.load(Ordering::Relaxed);
         let patience = if is_full { self.patience / IMPATIENT } else { self.patience };
@@ -98,7 +95,7 @@ pub struct Publisher<M> {
 }
 
 impl<M: Message> Publisher<M> {
-    /// Publishes a message as [`RawPublisher::publish`] does, but waits for a second at most.
+    /// Publishes a message as [`RawPublisher::publish`] does.
     pub async fn publish(&self, message: &M) {
         match cdr_encoding::to_vec::<M, LittleEndian>(message) {
             Ok(body) => self.raw.publish(body).await,
@@ -129,7 +126,7 @@ mod tests {
         let never = std::future::pending::<Result<(), String>>();
         let reason = within(Duration::from_millis(10), never).await.unwrap_err();
         assert!(reason.contains("0.01 s"), "{reason}");
-        assert_eq!(within(PATIENCE, async { Err("full") }).await, Err("full".to_owned()));
+        assert_eq!(within(Duration::from_secs(1), async { Err("full") }).await, Err("full".to_owned()));
     }
 
     #[test]

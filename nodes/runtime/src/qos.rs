@@ -12,7 +12,13 @@ pub struct Qos {
     latched: bool,
     depth: usize,
     lifespan: Option<Duration>,
+    patience: Duration,
 }
+
+/// How long a writer whose readers have taken nothing of what it keeps for them waits before the oldest makes room.
+const PATIENCE: Duration = Duration::from_secs(1);
+/// And that of a bag's messages, of which none shall be lost: longer than it takes to notice that a reader has died (20 s with Fast DDS).
+const REPLAY_PATIENCE: Duration = Duration::from_secs(30);
 
 impl Qos {
     /// Samples that a reader waits for in a replay before the oldest is lost. The writer waits for
@@ -21,7 +27,7 @@ impl Qos {
 
     /// Sensor data: best effort, the newest `depth` samples.
     pub const fn sensor(depth: usize) -> Self {
-        Self { reliable: false, latched: false, depth, lifespan: None }
+        Self { reliable: false, latched: false, depth, lifespan: None, patience: PATIENCE }
     }
 
     /// Data whose every sample counts, from one writer to readers that are there.
@@ -45,9 +51,15 @@ impl Qos {
         Self { depth, ..self }
     }
 
+    /// The same for a writer that waits for half a minute before a reader that stands still loses anything.
+    #[must_use]
+    pub const fn patient(self) -> Self {
+        Self { patience: REPLAY_PATIENCE, ..self }
+    }
+
     /// As `/rosout` has it in rclcpp: reliable, the last 1000 lines of the last ten seconds.
     pub(crate) const fn rosout() -> Self {
-        Self { reliable: true, latched: true, depth: 1000, lifespan: Some(Duration::from_secs(10)) }
+        Self { latched: true, lifespan: Some(Duration::from_secs(10)), ..Self::reliable(1000) }
     }
 
     /// Samples kept.
@@ -55,10 +67,15 @@ impl Qos {
         self.depth
     }
 
+    /// How long a message waits for room.
+    pub(crate) const fn patience(self) -> Duration {
+        self.patience
+    }
+
     pub(crate) fn profile(self) -> QosProfile {
         QosProfile {
             reliability: if self.reliable {
-                Reliability::Reliable { when_full: WhenFull::Wait(Duration::from_secs(1)) }
+                Reliability::Reliable { when_full: WhenFull::Wait(self.patience) }
             } else {
                 Reliability::BestEffort
             },

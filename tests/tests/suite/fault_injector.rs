@@ -50,3 +50,51 @@ fn faults_happen_when_and_where_they_are_planned() {
     assert_eq!(speeds[60..], whole(80..100));
     injector.wait_for_log("fault 3 of 3: nan odom", PATIENCE);
 }
+
+/// More messages than a writer keeps for a reader that takes none (8192), with one that stands still beside one that does not: the last arrives.
+#[test]
+fn a_subscriber_that_stands_still_costs_the_others_no_message() {
+    let cyclone = cyclone();
+    if !available(std::slice::from_ref(&cyclone)) {
+        return;
+    }
+    let python = cyclone.unwrap();
+    let domain = Domain::new();
+    let subscribe =
+        ["subscribe", "/odom", ODOMETRY, "--qos", "reliable", "--count", "12000", "--timeout", "60"];
+    let sink = start_cyclone(&domain, &python, &subscribe);
+    let behind = [
+        "-p",
+        "reliable_inputs:=true",
+        "-r",
+        "__node:=behind",
+        "-r",
+        "/in/odom:=/odom",
+        "-r",
+        "/odom:=/behind/odom",
+    ];
+    let listener = node(&domain, "fault_injector", &behind);
+    listener.wait_for_log("started", PATIENCE);
+    let injector = node(&domain, "fault_injector", &["-p", "reliable_inputs:=true"]);
+    injector.wait_for_log("started", PATIENCE);
+    let publish = ["publish", "/in/odom", ODOMETRY, "--qos", "reliable", "--period", "0.0003"];
+    let mut source = start_cyclone(&domain, &python, &publish);
+    let message = |index: u32| {
+        let stamp = json!({"sec": 1000 + index / 200, "nanosec": index % 200 * 5_000_000});
+        json!({"header": {"stamp": stamp}, "twist": {"twist": {"linear": {"x": index}}}}).to_string() + "\n"
+    };
+    let feeding = std::thread::spawn(move || {
+        source.feed(&(0..12_000).map(message).collect::<String>());
+        source
+    });
+    for index in 0..12_000 {
+        let heard = sink.line(PATIENCE);
+        // By then all have found each other.
+        if index == 2000 {
+            listener.signal("STOP");
+        }
+        let speed = parsed::<Value>(&heard).pointer("/twist/twist/linear/x").and_then(Value::as_f64);
+        assert_eq!(speed, Some(f64::from(index)));
+    }
+    feeding.join().unwrap();
+}

@@ -5,6 +5,7 @@
 
 use crate::conclude::unstable_at_mps;
 use crate::envelope::Envelope;
+use crate::tires::MOST_FORCE;
 use crate::{Identification, Outcome, PeakFriction, Status, ValidWithin};
 
 /// A force, stiffness included, over the lower end of its interval at any slip driven: a controller with the classical gain margin of 6 dB bears a
@@ -206,13 +207,20 @@ fn signals(run: &Identification, outcome: &Outcome, verdict: &mut Verdict) {
 
 /// Peaks that were not reached, and priors that have a say there.
 fn peaks(run: &Identification, outcome: &Outcome, verdict: &mut Verdict) {
-    let Verdict { remarks, drive, .. } = verdict;
+    let Verdict { against, remarks, drive, .. } = verdict;
     let peak = &outcome.peak_friction;
     let evidence = &run.direct.peak;
     for (axle, friction, slip, shown) in [
         ("front", &peak.front, &outcome.slip_range_rad.front, &evidence.front),
         ("rear", &peak.rear, &outcome.slip_range_rad.rear, &evidence.rear),
     ] {
+        if shown.height > MOST_FORCE {
+            against.push(format!(
+                "the {axle} tires would have given {:.1} times their static load, and none gives more than {MOST_FORCE:.1}: are speed, yaw rate \
+                 and clock in SI units throughout?",
+                shown.height
+            ));
+        }
         let PeakFriction { reached, .. } = *friction;
         if reached {
             continue;

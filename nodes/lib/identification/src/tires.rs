@@ -11,8 +11,10 @@ pub const STIFFNESS_BOUNDS: (f64, f64) = (0.5, 100.0);
 pub const B_BOUNDS: (f64, f64) = (0.1, 100.0);
 /// Shape factor C. Below 1 the curve has no peak and D means nothing.
 pub const C_BOUNDS: (f64, f64) = (1.0, 2.2);
-/// Peak factor D. Ice has 0.05; slicks under downforce, over the static load, reach 3.
+/// Peak factor D. Ice has 0.05; slicks under downforce, over the static load, reach [`MOST_FORCE`].
 pub const D_BOUNDS: (f64, f64) = (0.05, 3.5);
+/// The most force over the static load that tires show: slicks under downforce.
+pub const MOST_FORCE: f64 = 3.0;
 /// Curvature factor E. Above 1 the force changes its sign at large slip.
 pub const E_BOUNDS: (f64, f64) = (-6.0, 0.99);
 

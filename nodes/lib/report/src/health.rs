@@ -21,9 +21,6 @@ pub(crate) fn health(health: &DataHealth) -> Vec<(&'static str, String)> {
         ("Duration", format!("{} s, moving {}", fixed(health.duration_s, 1), percent(health.moving_share))),
         ("Pauses", gaps),
         ("Frozen", if frozen.is_empty() { "none".into() } else { frozen }),
-        (
-            "Also recorded",
-            if health.recorded.is_empty() { "nothing".into() } else { health.recorded.join(", ") },
-        ),
+        ("Recorded", if health.recorded.is_empty() { "nothing".into() } else { health.recorded.join(", ") }),
     ]
 }

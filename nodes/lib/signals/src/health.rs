@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::channels::Kind;
 use crate::{Pace, SignalError, StateSequence, segment};
 
 /// A pause in the samples.
@@ -41,7 +42,7 @@ pub struct DataHealth {
     pub frozen: Vec<FrozenSpan>,
     /// Share of the time in which the car moved (over 0.3 m/s).
     pub moving_share: f64,
-    /// Optional channels that are there.
+    /// Channels that are there, stamps left out: optional ones that were recorded, and those of every sequence that are not zero throughout.
     pub recorded: Vec<&'static str>,
 }
 
@@ -75,7 +76,11 @@ impl DataHealth {
             recorded: sequence
                 .table()
                 .into_iter()
-                .filter(|(channel, values)| !channel.required && !values.is_empty())
+                .filter(|(channel, values)| {
+                    let is_there =
+                        if channel.required { values.iter().any(|&v| v != 0.0) } else { !values.is_empty() };
+                    channel.kind != Kind::Time && is_there
+                })
                 .map(|(channel, _)| channel.name)
                 .collect(),
         })

@@ -2,7 +2,7 @@
 
     adapter: f1tenth_gym
     parameter_file: f1tenth.yaml        # the gym's parameter dictionary (mu, C_Sf, ...), as YAML, JSON or a Python dictionary
-    options: {checkout: f1tenth_gym, timestep: "0.01", integrator: Euler}
+    options: {checkout: f1tenth_gym, timestep: "0.01", integrator: RK4}   # F110Env's: RK4 unless yours is told Euler
 
 Reference point: the centre of gravity. `steer_buffer_size` is in code (base_classes.py, RaceCar.__init__).
 """
@@ -27,6 +27,8 @@ BOUNDS = {
 }
 DEFAULTS = dict(mu=1.0489, C_Sf=4.718, C_Sr=5.4562, lf=0.15875, lr=0.17145, h=0.074, m=3.74, I=0.04712, s_min=-0.4189,
                 s_max=0.4189, sv_min=-3.2, sv_max=3.2, v_switch=7.319, a_max=9.51, v_min=-5.0, v_max=20.0)
+# What the gym keeps twice: a limit to the left and one to the right.
+RIGHT = {"sv_max": "sv_min", "s_max": "s_min"}
 
 
 def load_dynamics(checkout):
@@ -59,8 +61,12 @@ class F1tenthGym(Simulator):
         keys = keys_of(read, DEFAULTS)
         values = {name: read[key] for name, key in keys.items()}
         self.values, self.dynamics, self.step_s, self.rk4 = {**DEFAULTS, **values}, dynamics, step_s, integrator == "RK4"
+        # A limit that is the same on both sides is one parameter; one to the right that differs stays as it is.
+        self.same = {left: right for left, right in RIGHT.items()
+                     if right not in values or values[right] == -self.values[left]}
+        both = {left: [keys[left], "-" + keys[right]] for left, right in self.same.items() if left in keys and right in keys}
         self.parameters = [
-            dict(name=name, value=self.values[name], low=low, high=high, unit=unit, key=keys.get(name),
+            dict(name=name, value=self.values[name], low=low, high=high, unit=unit, key=both.get(name, keys.get(name)),
                  in_code=None if name in keys else "params of F110Env", site=site)
             for name, (low, high, unit, site) in BOUNDS.items()
         ]
@@ -71,7 +77,7 @@ class F1tenthGym(Simulator):
     def place(self, parameters, motion, fresh):
         if fresh:
             p = {**self.values, **parameters}
-            p["sv_min"], p["s_min"] = -p["sv_max"], -p["s_max"]
+            p.update({right: -p[left] for left, right in self.same.items()})
             names = ("mu", "C_Sf", "C_Sr", "lf", "lr", "h", "m", "I", "s_min", "s_max", "sv_min", "sv_max", "v_switch",
                      "a_max", "v_min", "v_max")
             self.p, self.arguments = p, tuple(float(p[n]) for n in names)
@@ -105,7 +111,7 @@ def main():
     values = read_values(sys.argv[1] if len(sys.argv) > 1 else "")
     dynamics = load_dynamics(options.get("checkout", "f1tenth_gym"))
     size = int(options.get("steer_buffer_size", 2))
-    serve(F1tenthGym(values, dynamics, float(options.get("timestep", 0.01)), options.get("integrator", "Euler"), size))
+    serve(F1tenthGym(values, dynamics, float(options.get("timestep", 0.01)), options.get("integrator", "RK4"), size))
 
 
 if __name__ == "__main__":

@@ -74,7 +74,7 @@ pub struct SimulatorParameter {
     #[serde(default = "one")]
     pub unit: String,
     /// Where it stands in the parameter file: the keys that lead to it, joined by dots (`tire.p_dy1`); one text, or a list where the same
-    /// figure stands in several places (the tires of an axle, wheel by wheel).
+    /// figure stands in several places (the tires of an axle, wheel by wheel). Behind a minus (`-sv_min`) the figure stands with the other sign.
     #[serde(default, rename = "key", deserialize_with = "one_or_more")]
     pub keys: Vec<String>,
     /// Where it stands in the code, in words; such a parameter is never patched.

@@ -50,7 +50,8 @@ pub fn patch(
         match &path {
             Some(path) if !p.keys.is_empty() => {
                 for key in &p.keys {
-                    text = with_value(&text, key, p.value, value)
+                    let (key, sign) = key.strip_prefix('-').map_or((key.as_str(), 1.0), |key| (key, -1.0));
+                    text = with_value(&text, key, sign * p.value, sign * value)
                         .map_err(|why| SimulatorError::Patch { path: path.clone(), why })?;
                 }
                 changed.push((name.clone(), value));
@@ -196,6 +197,12 @@ mod tests {
         let found = patch(&file, &description, &[("stiffness".to_owned(), 7.5)]).unwrap().unwrap();
         assert_eq!(found.text, "left: {b: 7.5}\nright: {b: 7.5}\n");
         assert!(found.by_hand.is_empty() && found.changed.len() == 1);
+        // A limit to the left and to the right.
+        std::fs::write(folder.path().join("car.yaml"), "s_min: -10\ns_max: 10\n").unwrap();
+        description.parameters =
+            vec![serde_json::from_str(&parameter(r#""key": ["s_max", "-s_min"]"#)).unwrap()];
+        let found = patch(&file, &description, &[("stiffness".to_owned(), 7.5)]).unwrap().unwrap();
+        assert_eq!(found.text, "s_min: -7.5\ns_max: 7.5\n");
     }
 
     #[test]

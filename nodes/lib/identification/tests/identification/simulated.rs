@@ -53,6 +53,30 @@ fn finds_delay_and_lever_arm_that_were_put_in() {
     assert!((with.v_y_lever_arm_m - without.v_y_lever_arm_m + 0.1).abs() < 0.03, "{with:?} {without:?}");
 }
 
+/// A clock at half its pace: everything agrees with everything, and the tires give four times the force.
+#[test]
+fn forces_that_no_tire_gives_are_refused() {
+    let (_, sequence, vehicle) = drive(scenario("f1tenth", "club", 0.9, 0.9, 5).duration(20.0));
+    let mut fast = sequence.clone();
+    for (channel, values) in fast.table_mut() {
+        let factor = match channel.unit {
+            "s" => 0.5,
+            "m/s" | "rad/s" => 2.0,
+            "m/s^2" => 4.0,
+            _ => 1.0,
+        };
+        values.iter_mut().for_each(|v| *v *= factor);
+    }
+    let [right, wrong] =
+        [&sequence, &fast].map(|s| identify(s, &vehicle, None, None, &quick(), &mut |_| {}).unwrap());
+    assert!(right.accepted, "{:?}", right.reasons);
+    assert!(
+        !wrong.accepted && wrong.reasons.iter().any(|r| r.contains("static load")),
+        "{:?}",
+        wrong.reasons
+    );
+}
+
 #[test]
 fn a_mirrored_drive_gives_the_same_tires() {
     let (_, sequence, vehicle) = drive(scenario("f1tenth", "club", 0.9, 0.85, 5).duration(20.0));

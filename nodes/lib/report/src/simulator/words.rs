@@ -170,8 +170,15 @@ pub fn simulator_text(d: &SimulatorDiagnosis, patch: &PatchSaid, data_notes: &[S
             "patch      none: the patched simulator does no better on held-out data, as far as these tell"
         );
     } else if let Some(error) = patch.verified {
-        let from = significant(g.nominal.value, 3);
-        let _ = writeln!(out, "patch      verified: {from} to {} times the noise", significant(error, 3));
+        // As many digits as the figures above have.
+        let digits = |value: f64| significant(value, if value < 10.0 { 2 } else { 3 });
+        let without = if patch.by_hand.is_empty() { "" } else { ", without what is by hand" };
+        let _ = writeln!(
+            out,
+            "patch      verified: {} to {} times the noise{without}",
+            digits(g.nominal.value),
+            digits(error)
+        );
     }
     lines(&mut out, "by hand    ", &patch.by_hand);
     let _ = writeln!(

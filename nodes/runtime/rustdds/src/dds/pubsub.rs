@@ -552,6 +552,10 @@ impl InnerPublisher {
       writer_qos.is_reliable(),
       guid.entity_id.entity_kind.is_built_in(),
       volatile,
+      match writer_qos.history() {
+        Some(policy::History::KeepAll) => None,
+        _ => writer_qos.reliable_max_blocking_time().map(Into::into),
+      },
       window_limit,
       backlog_limit,
       max_retain,

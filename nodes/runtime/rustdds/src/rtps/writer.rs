@@ -2781,6 +2781,7 @@ mod tests {
           true, // reliable
           writer_id.kind().is_built_in(),
           false,
+          None,
           DEFAULT_WRITER_MAX_SAMPLES,
           DEFAULT_WRITER_MAX_SAMPLES,
           DEFAULT_WRITER_MAX_SAMPLES,

@@ -46,6 +46,8 @@ struct Inner {
   // Maintained by the Writer (event loop) via `set_acked_frontier`.
   acked_before: SequenceNumber,
   reliable_readers_present: bool,
+  // When that frontier last advanced, or the first such reader came.
+  advanced_at: Instant,
 
   // nonblocking-transmit: the unsent backlog limit. The Writer advances
   // `sent_frontier` as it actually transmits samples; when the network socket
@@ -89,6 +91,11 @@ struct Shared {
   // (TRANSIENT_LOCAL / TRANSIENT / PERSISTENT) the writer must retain samples for
   // late-joining readers, so pre-match trimming is disabled.
   volatile: bool,
+  // History KEEP_LAST: for how long a full window may stand still before the
+  // oldest sample makes room (DDS v1.4 2.2.3.18), so that a reader which
+  // acknowledges nothing costs its own samples and not those of all others.
+  // `None`: KEEP_ALL waits for it.
+  stands_still: Option<StdDuration>,
   topic_name: String,
 }
 
@@ -114,6 +121,7 @@ impl WriterSendBuffer {
     reliable_writer: bool,
     is_builtin: bool,
     volatile: bool,
+    stands_still: Option<StdDuration>,
     window_limit: usize,
     backlog_limit: usize,
     max_retain: usize,
@@ -127,6 +135,7 @@ impl WriterSendBuffer {
           window_limit: window_limit.max(1),
           acked_before: SequenceNumber::new(1),
           reliable_readers_present: false,
+          advanced_at: Instant::now(),
           backlog_limit: backlog_limit.max(1),
           sent_frontier: SequenceNumber::new(0),
           max_retain: max_retain.max(1),
@@ -137,6 +146,7 @@ impl WriterSendBuffer {
         reliable_writer,
         is_builtin,
         volatile,
+        stands_still,
         topic_name,
       }),
     }
@@ -179,6 +189,9 @@ impl WriterSendBuffer {
     // Number of unacknowledged samples in [acked_before, last_seq].
     let unacked = i64::from(inner.last_seq) - i64::from(inner.acked_before) + 1;
     unacked < inner.window_limit as i64
+      || shared
+        .stands_still
+        .is_some_and(|most| inner.advanced_at.elapsed() > most)
   }
 
   // Wake every parked producer / ack-waiter. Called after any state change that
@@ -291,8 +304,17 @@ impl WriterSendBuffer {
     let trim_keep_last = !shared.is_builtin
       && (!may_block
         || (shared.reliable_writer && shared.volatile && !inner.reliable_readers_present));
-    if trim_keep_last {
-      while inner.changes.len() > inner.max_retain {
+    let most = if trim_keep_last {
+      Some(inner.max_retain)
+    } else if !shared.is_builtin && shared.reliable_writer && shared.stands_still.is_some() {
+      // Of a window that stands still the oldest makes room; its reader is told that
+      // it is gone.
+      Some(max(inner.window_limit, inner.max_retain))
+    } else {
+      None
+    };
+    if let Some(most) = most {
+      while inner.changes.len() > most {
         // BTreeMap keeps keys sorted, so the first entry is the oldest SN.
         let oldest = match inner.changes.keys().next().copied() {
           Some(sn) => sn,
@@ -335,6 +357,7 @@ impl WriterSendBuffer {
       }
     };
     if advanced {
+      inner.advanced_at = Instant::now();
       Self::wake_all(&mut inner, &shared.progress);
     }
   }
@@ -482,6 +505,7 @@ mod tests {
       /* reliable_writer */ true,
       /* is_builtin */ false,
       /* volatile */ true,
+      /* stands_still */ None,
       /* window_limit */ 1,
       /* backlog_limit */ 1000,
       /* max_retain */ 1,
@@ -496,6 +520,36 @@ mod tests {
     assert!(admit_now(&buf, WriteOptions::default())); // seq 2
   }
 
+  // A reader that acknowledges nothing costs the samples that it has not taken, and
+  // holds the writer up no longer than it may stand still.
+  #[test]
+  fn window_that_stands_still_makes_room_by_its_oldest() {
+    let buf = WriterSendBuffer::new(
+      GUID::GUID_UNKNOWN,
+      "t".to_string(),
+      /* reliable_writer */ true,
+      /* is_builtin */ false,
+      /* volatile */ true,
+      /* stands_still */ Some(StdDuration::from_millis(50)),
+      /* window_limit */ 2,
+      /* backlog_limit */ 1000,
+      /* max_retain */ 1,
+    );
+    buf.set_acked_frontier(Some(SequenceNumber::zero()));
+    assert!(admit_now(&buf, WriteOptions::default()));
+    assert!(admit_now(&buf, WriteOptions::default()));
+    assert!(!admit_now(&buf, WriteOptions::default()));
+
+    std::thread::sleep(StdDuration::from_millis(60));
+    assert!(admit_now(&buf, WriteOptions::default()));
+    assert_eq!(buf.retained_len(), 2);
+    assert_eq!(buf.first_change_sequence_number(), SequenceNumber::new(2));
+
+    // Once it moves, the window bounds again.
+    buf.set_acked_frontier(Some(SequenceNumber::new(2)));
+    assert!(!admit_now(&buf, WriteOptions::default()));
+  }
+
   // nonblocking-transmit: a best-effort writer that opted in via
   // `best_effort_may_block` is throttled by the unsent-backlog limit once the
   // socket stops draining, and released when the Writer advances the sent
@@ -508,6 +562,7 @@ mod tests {
       /* reliable_writer */ false,
       /* is_builtin */ false,
       /* volatile */ true,
+      /* stands_still */ None,
       /* window_limit */ 1000,
       /* backlog_limit */ 2,
       /* max_retain */ 1000,
@@ -536,6 +591,7 @@ mod tests {
       /* reliable_writer */ false,
       /* is_builtin */ false,
       /* volatile */ true,
+      /* stands_still */ None,
       /* window_limit */ 1000,
       /* backlog_limit */ 1,
       /* max_retain */ 1000,
@@ -556,6 +612,7 @@ mod tests {
       false,
       /* is_builtin */ true,
       /* volatile */ true,
+      /* stands_still */ None,
       1000,
       /* backlog_limit */ 1,
       /* max_retain */ 1000,
@@ -580,6 +637,7 @@ mod tests {
       /* reliable_writer */ false,
       /* is_builtin */ false,
       /* volatile */ true,
+      /* stands_still */ None,
       /* window_limit */ 1000,
       /* backlog_limit */ 1000,
       max_retain,
@@ -643,6 +701,7 @@ mod tests {
       /* reliable_writer */ true,
       /* is_builtin */ false,
       /* volatile */ true,
+      /* stands_still */ None,
       /* window_limit */ 1000,
       /* backlog_limit */ 1000,
       max_retain,
