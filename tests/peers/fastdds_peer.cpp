@@ -202,6 +202,8 @@ DataReader* reader(DomainParticipant* participant, Topic* topic, DurabilityQosPo
     DataReaderQos qos;
     qos.reliability().kind = RELIABLE_RELIABILITY_QOS;
     qos.durability().kind = durability;
+    // By default a sample that comes before the one before it was taken takes its place.
+    qos.history().depth = 1000;
     qos.endpoint().history_memory_policy = eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
     return participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT)->create_datareader(topic, qos);
 }

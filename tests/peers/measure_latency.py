@@ -214,6 +214,9 @@ def measure(car, args, vehicle):
     took += ends(args.bin, vehicle, args.ends)
     load = os.getloadavg()
     print(f"{args.peer}: samples {len(samples)} at {args.hz:.0f} Hz, residuals {len(latency_ms)}, lost {len(samples) - len(latency_ms)}")
+    lost_s = [f"{index / args.hz:.2f}" for index, (_, arrived) in enumerate(samples) if arrived is None]
+    if lost_s:
+        print(f"lost at, s: {', '.join(lost_s[:20])}{' ...' if len(lost_s) > 20 else ''}")
     print(f"sample to residual, ms: p50 {share(latency_ms, 0.5):.2f}, p99 {share(latency_ms, 0.99):.2f}, p99.9 {share(latency_ms, 0.999):.2f}, most {max(latency_ms):.2f}")
     print(f"the peer's own lateness, ms: p50 {1e3 * share(late, 0.5):.2f}, p99 {1e3 * share(late, 0.99):.2f}, most {1e3 * max(late):.2f}")
     print(f"SIGINT to the end, s, {len(took)} ends: p50 {share(took, 0.5):.3f}, p99 {share(took, 0.99):.3f}, most {max(took):.3f}")

@@ -45,6 +45,8 @@ pub struct LiveResidual {
     corrected: Corrected,
     /// The samples of the last time step, oldest first.
     recent: VecDeque<Passed>,
+    /// The last sample was predicted from one: the next is from the one after that.
+    follows: bool,
 }
 
 /// A sample that later ones are predicted from.
@@ -75,6 +77,7 @@ impl LiveResidual {
             stiffness: phi.front.normalized_stiffness().max(phi.rear.normalized_stiffness()),
             corrected: Corrected::new(corrections),
             recent: VecDeque::new(),
+            follows: false,
             model,
         })
     }
@@ -89,6 +92,7 @@ impl LiveResidual {
     pub fn reset(&mut self) {
         self.corrected.clear();
         self.recent.clear();
+        self.follows = false;
     }
 
     /// Takes the next sample, in the order of stamps; `None` where nothing predicts it. Allocates only where a recurrence begins.
@@ -103,6 +107,7 @@ impl LiveResidual {
             return Ok(None);
         }
         let origin = self.origin(stamp_ns);
+        self.follows = origin.is_some();
         let (live, memory) = match origin {
             Some((dt_s, origin)) => {
                 let live = self.compare(stamp_ns, &state, &input, dt_s, &origin);
@@ -127,7 +132,11 @@ impl LiveResidual {
         let dt_s = self.model.dt_s;
         while let Some(oldest) = self.recent.front() {
             let before_s = (stamp_ns - oldest.stamp_ns) as f64 * 1e-9;
-            if before_s < (1.0 - STEP_TOLERANCE) * dt_s {
+            // The first is the one that comes nearest, so that stamps which jitter later stay within the tolerance.
+            let spacing_s =
+                self.recent.get(1).map_or(before_s, |o| (o.stamp_ns - oldest.stamp_ns) as f64 * 1e-9);
+            let nearest_s = if self.follows { 0.0 } else { dt_s - 0.5 * spacing_s };
+            if before_s < nearest_s.max((1.0 - STEP_TOLERANCE) * dt_s) {
                 return None;
             }
             let passed = self.recent.pop_front()?;

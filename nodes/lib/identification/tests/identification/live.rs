@@ -124,3 +124,25 @@ fn the_network_makes_the_residual_smaller_and_none_leaves_it() {
     let mut live = LiveResidual::new(&vehicle, none, candidate.corrections).unwrap();
     assert!(follow(&mut live, &samples(&sequence)).iter().flatten().all(|s| s.nominal == s.corrected));
 }
+
+/// At 200 samples a second for a model of 50, with stamps that jitter: each is predicted from the one a time step before, and none is left out.
+#[test]
+fn stamps_that_jitter_cost_no_sample() {
+    let (sequence, vehicle, candidate, model) = learned(Method::Robust, ResidualKind::None);
+    let mut live = LiveResidual::new(&vehicle, model.clone(), candidate.corrections).unwrap();
+    let mut samples: Vec<_> = samples(&sequence).into_iter().step_by(2).take(400).collect();
+    let step_ns = (0.25e9 * model.dt_s) as i64;
+    for (k, sample) in samples.iter_mut().enumerate() {
+        let jitter_ns = [0, -1, 700_000, -900_000, 1, 0, -1][k % 7];
+        sample.odometry.stamp_ns = 1_000_000_000 + k as i64 * step_ns + jitter_ns;
+        sample.drive.stamp_ns = sample.odometry.stamp_ns;
+        sample.odometry.v_x_mps = sample.odometry.v_x_mps.max(2.0);
+    }
+    let lives = follow(&mut live, &samples);
+    let first = lives.iter().position(Option::is_some).unwrap();
+    assert_eq!(first, 4);
+    for sample in &lives[first..] {
+        let dt_s = sample.as_ref().expect("a sample without its residual").dt_s;
+        assert!((dt_s / model.dt_s - 1.0).abs() < 0.1, "{dt_s}");
+    }
+}
