@@ -77,6 +77,30 @@ fn a_small_batch_is_made_diagnosed_and_scored() {
     assert!(error.contains("is not the file that cases/commitment.txt was made for"), "{error}");
 }
 
+/// As tests/results/simulators says, with a Python named from the folder that the command runs in.
+#[test]
+fn pairs_of_simulator_and_car_are_made_diagnosed_and_scored() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap();
+    if !root.join(".venv/bin/python").exists() {
+        println!("skipped: no .venv here; launch_scripts/setup.sh --tests makes it");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::os::unix::fs::symlink(root.join(".venv"), folder.join(".venv")).unwrap();
+    let maker = root.join("tests/plants/make_simulator_pairs.py");
+    let make = format!(
+        "withheld make --simulators 2 --simulator-maker {} --python .venv/bin/python --duration 10 --seed 1 --out pairs --labels labels.json",
+        maker.display()
+    );
+    done(folder, &make);
+    done(folder, "withheld diagnose pairs --out verdicts");
+    let text =
+        done(folder, "withheld score pairs verdicts --labels labels.json --no-oracle --so-far --out report");
+    // One unchanged pair, one with a structure that ten seconds may be too short for.
+    assert!(text.contains("simulator and car: 2 pairs") && text.contains("right, slipx: 1/1"), "{text}");
+}
+
 #[test]
 fn what_would_break_the_seal_is_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -198,7 +198,8 @@ pub(crate) fn pair(
         }
         let path = folder.join(files::SIMULATOR);
         let text = fs::read_to_string(&path).map_err(WithheldError::io(&path))?;
-        let more = format!("python: '{}'\nprocesses: 1\ntime_limit_s: 600\n", settings.python.display());
+        let python = from_anywhere(&settings.python);
+        let more = format!("python: '{}'\nprocesses: 1\ntime_limit_s: 600\n", python.display());
         fs::write(&path, text + &more).map_err(WithheldError::io(&path))?;
         let circumstances = [
             ("simulator", Value::from(name)),
@@ -294,6 +295,14 @@ fn sealed(effect: &str, key: &str, made: &MadeChange) -> SealedEffect {
     }
 }
 
+/// A program as it can be started from any folder: the simulator runs in that of its case. A bare name is one of the search path's.
+fn from_anywhere(program: &Path) -> PathBuf {
+    if program.components().count() < 2 {
+        return program.to_owned();
+    }
+    std::path::absolute(program).unwrap_or_else(|_| program.to_owned())
+}
+
 #[cfg(test)]
 mod tests {
     use rand::SeedableRng as _;
@@ -330,6 +339,13 @@ echo $((calls + 1)) > $folder/../calls
 severity=$([ $calls = 0 ] && echo 0.5 || echo 7.0)
 echo "{\"noise\": [0.1], \"changes\": {\"${3%%=*}\": {\"value\": 2.0, \"before\": 1.0, \"severity\": $severity, \"chi2_per_residual\": 3.0}}}"
 "#;
+
+    #[test]
+    fn a_python_beside_the_maker_is_found_from_the_case_s_folder() {
+        assert_eq!(from_anywhere(Path::new("python3")), Path::new("python3"));
+        let python = from_anywhere(Path::new(".venv/bin/python"));
+        assert!(python.is_absolute() && python.ends_with(".venv/bin/python"), "{}", python.display());
+    }
 
     #[test]
     fn a_change_that_does_not_show_is_drawn_anew_and_the_folder_does_not_tell_it() {
