@@ -58,7 +58,7 @@ def growth(times, values):
     """By the hour, in the second half: the slope of a line, with the half width of its 90 % interval."""
     half = times >= 0.5 * times[-1]
     times, values = times[half] / 3600.0, values[half]
-    if len(times) < 20:
+    if len(times) < 10:
         return float("nan"), float("nan")
     slope, at = np.polyfit(times, values, 1)
     # Neighbours are alike: ten parts, each with the mean of what the line leaves, at its own time.
