@@ -20,6 +20,14 @@ pub enum StateError {
         /// Poses needed.
         needed: usize,
     },
+    /// Poses and speeds do not belong together, as far as the filter can tell.
+    #[error("the poses contradict the speeds: a jump at {jumps} of {poses} of them")]
+    Contradicted {
+        /// Jumps, of several poses each.
+        jumps: usize,
+        /// Poses there.
+        poses: usize,
+    },
     /// The filter lost its way.
     #[error("the covariance is no longer positive definite at {time_s:.3} s")]
     Diverged {

@@ -44,7 +44,7 @@ const GATE_POSE: f64 = 16.27;
 /// Of one number, likewise.
 const GATE_ONE: f64 = 10.83;
 /// So many poses in a row that contradict are a jump of the localisation.
-const JUMP_POSES: usize = 4;
+pub(crate) const JUMP_POSES: usize = 4;
 /// Place, heading, speeds, yaw rate and accelerations: the states before the constants.
 const MOTION: usize = 9;
 

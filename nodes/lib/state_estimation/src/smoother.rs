@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::error::StateError;
 use crate::events::events;
-use crate::filter::{Filter, Motion};
+use crate::filter::{Filter, JUMP_POSES, Motion};
 use crate::levels::Levels;
 use crate::state::{ARM, B_R, B_X, B_Y, LATE, Matrix, PSI, RATE, SCALE, TILT, V_X, Vector, X, Y};
 
@@ -94,6 +94,11 @@ pub fn smooth(sequence: &StateSequence) -> Result<Smoothed, StateError> {
         }
         let anew = if filter.jumps_s.len() > jumps { filter.anew } else { 0 };
         steps.push(Step { time_s, transition, predicted, known: (filter.s, filter.p), anew });
+    }
+    // Where jumps hold more poses than not, what the filter makes of them is no motion.
+    let jumps = filter.jumps_s.len();
+    if 2 * JUMP_POSES * jumps > poses.time_s.len() && jumps > 1 {
+        return Err(StateError::Contradicted { jumps, poses: poses.time_s.len() });
     }
     back(&mut steps)?;
     let last = steps.last().ok_or(StateError::NothingMeasured)?;

@@ -172,3 +172,15 @@ fn an_acceleration_that_is_smooth_and_wrong_is_not_believed() {
     assert!(rms < 0.03, "v_y off by {rms:.3} m/s");
     assert!(smoothed.jumps_s.is_empty(), "{:?}", smoothed.jumps_s);
 }
+
+/// Poses of another car: what a filter that begins anew at each of them makes of the motion is none.
+#[test]
+fn poses_that_contradict_the_speeds_throughout_give_no_motion() {
+    let (mut sequence, _) = drive(Recorded { jump: false, delay_s: 0.0, ..LOCALISED }, 4);
+    assert!(smooth(&sequence).is_ok());
+    for places in [&mut sequence.pose_x_m, &mut sequence.pose_y_m, &mut sequence.x_m, &mut sequence.y_m] {
+        places.iter_mut().for_each(|place| *place *= 6.0);
+    }
+    let error = smooth(&sequence).unwrap_err();
+    assert!(matches!(error, StateError::Contradicted { .. }), "{error}");
+}
