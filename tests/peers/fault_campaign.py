@@ -1,6 +1,6 @@
 """Plays drives of the reference car into the suite with faults, and beside it the same drives without; a CycloneDDS peer, as cyclone_peer.py.
 
-    fault_campaign.py OUT [--faults 1000] [--seed 1] [--bin FOLDER] [--rate 10] [--minutes M] [--job K]
+    fault_campaign.py OUT [--faults 1000] [--seed 1] [--bin FOLDER] [--rate 10] [--minutes M] [--again RUN ...]
 
 Faults of topics are the fault_injector's (its README has the kinds); faults of processes are made here: a node killed and started again, a
 node that stands still, the peer started again, a second identifier, a subscriber that stands still for good. Ten faults a run, all begun between 3 and
@@ -410,6 +410,7 @@ def main():
     parser.add_argument("--domain", type=int, default=int(os.environ.get("ROS_DOMAIN_ID", 90)))
     parser.add_argument("--kinds", help="draw these faults of topics alone, with commas between")
     parser.add_argument("--drives", type=int, default=len(DRIVES))
+    parser.add_argument("--again", type=int, nargs="+", default=[], metavar="RUN", help="these runs alone, by their seed in runs.csv")
     args = parser.parse_args()
     os.environ["ROS_DOMAIN_ID"] = str(args.domain)
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
@@ -423,7 +424,10 @@ def main():
     heard = Heard()
     count, index = 0, 0
     plan = [(drive, None) for drive in drives]
-    while count < args.faults and time.monotonic() - began < 60 * args.minutes:
+    if args.again:
+        runs = [(drives[seed % 1000 % len(drives)], seed) for seed in args.again]
+        plan = [entry for entry in plan if any(entry[0] is drive for drive, _ in runs)] + runs
+    while (plan or not args.again) and count < args.faults and time.monotonic() - began < 60 * args.minutes:
         drive, seed = plan.pop(0) if plan else (drives[index % len(drives)], 1000 * args.seed + index)
         index += seed is not None
         heard.messages.clear()
