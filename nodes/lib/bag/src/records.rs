@@ -26,6 +26,32 @@ enum Step {
     End,
 }
 
+/// Whether the texts of a header, schema or channel are as long as they say: the parser asks for that much memory before it looks.
+fn texts_fit(opcode: u8, body: &[u8]) -> Option<()> {
+    fn text<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
+        let (len, tail) = rest.split_first_chunk::<4>()?;
+        let (text, tail) = tail.split_at_checked(u32::from_le_bytes(*len) as usize)?;
+        *rest = tail;
+        Some(text)
+    }
+    let ids = match opcode {
+        op::HEADER => 0,
+        op::SCHEMA => 2,
+        op::CHANNEL => 4,
+        _ => return Some(()),
+    };
+    let mut rest = body.get(ids..)?;
+    text(&mut rest)?;
+    text(&mut rest)?;
+    if opcode == op::CHANNEL {
+        let mut pairs = text(&mut rest)?;
+        while !pairs.is_empty() {
+            text(&mut pairs)?;
+        }
+    }
+    Some(())
+}
+
 /// Reads the next record's body, of at most so many bytes, into `body`.
 fn step(source: &mut impl Read, body: &mut Vec<u8>, most: u64) -> io::Result<Step> {
     body.clear();
@@ -140,6 +166,9 @@ impl Records {
             Ok(opcode) => {
                 self.done = opcode == op::FOOTER;
                 self.messages += u64::from(opcode == op::MESSAGE);
+                if texts_fit(opcode, &self.body).is_none() {
+                    return Some(Err(self.damaged("a text in it is longer than the record")));
+                }
                 let parsed = mcap::parse_record(opcode, &self.body);
                 self.done |= parsed.is_err();
                 let damaged = |e: mcap::McapError| BagError::Damaged {
@@ -283,5 +312,24 @@ impl ChunkHeader {
             compressed_len: u64::from_le_bytes(*compressed_len),
             data_at: record.len() - data.len(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{op, texts_fit};
+
+    /// Found by fuzzing: 3.7 GB were asked for.
+    #[test]
+    fn a_text_longer_than_its_record_is_told_before_memory_is_asked_for() {
+        let text = |text: &str| [&(text.len() as u32).to_le_bytes(), text.as_bytes()].concat();
+        let channel = [&[1, 0, 1, 0][..], &text("/odom"), &text("cdr"), &text("")].concat();
+        assert!(texts_fit(op::CHANNEL, &channel).is_some());
+        for place in [4, 4 + 4 + 5, channel.len() - 4] {
+            let mut long = channel.clone();
+            long[place + 3] = 0xdf;
+            assert!(texts_fit(op::CHANNEL, &long).is_none(), "{place}");
+        }
+        assert!(texts_fit(op::HEADER, &[0xff; 8]).is_none() && texts_fit(op::MESSAGE, &[]).is_some());
     }
 }
