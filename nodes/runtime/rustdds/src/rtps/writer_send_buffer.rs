@@ -673,6 +673,7 @@ mod tests {
       /* reliable_writer */ true,
       /* is_builtin */ false,
       /* volatile */ false, // TRANSIENT_LOCAL etc: keep for late joiners
+      /* stands_still */ None,
       /* window_limit */ 1000,
       /* backlog_limit */ 1000,
       max_retain,
