@@ -1,20 +1,25 @@
-//! What sensors are off by over tenths of a second, beside the poses.
+//! What sensors and poses are off by over tenths of a second.
 //!
-//! A filtered or differentiated signal has hardly any noise from sample to sample and is wrong all the same. Believed to its white noise it outvotes the
-//! poses. Over spans of some length the poses say the same change: what remains of the difference, beyond the poses' own noise, counts as the white
-//! noise that would leave as much.
+//! A filtered or differentiated signal has hardly any noise from sample to sample and is wrong all the same, and so is a localisation that wanders. Believed
+//! to its white noise either outvotes the other. Over spans of some length poses and a sensor say the same change; what remains of the difference, beyond
+//! the white noise of both, tells by its growth with the span which of the two it is: a wandering localisation's change is bounded, and a sensor's error
+//! adds up. What the recording does not decide counts on both sides, each by its probability.
 
 use gripsight_signals::{Poses, StateSequence, yaw_rates};
 use nalgebra::{DMatrix, DVector};
 
-use crate::levels::Levels;
+use crate::levels::{Levels, Wander};
 
 /// Lengths of the spans.
-const SPANS_S: [f64; 4] = [0.1, 0.2, 0.4, 0.8];
+const SPANS_S: [f64; 5] = [0.1, 0.2, 0.4, 0.8, 1.6];
 /// A difference tells of a sensor where it is larger than what the poses' noise makes by this.
 const BEYOND: f64 = 1.5;
 /// Spans that a judgement needs.
 const LEAST_SPANS: usize = 20;
+/// Times over which a localisation, or a sensor, may forget what it is off by.
+const FORGETS_S: [f64; 5] = [0.1, 0.2, 0.4, 0.8, 1.6];
+/// A sensor that forgets at once.
+const WHITE_S: f64 = 1e-3;
 
 /// One span: what the poses say less nothing else, what the sensor says and what may be wrong with it, and how many samples it is worth.
 struct Row {
@@ -23,20 +28,34 @@ struct Row {
     samples: f64,
 }
 
-/// The levels with what the sensors leave beside the poses over tenths of a second. A localisation that wanders is not told from sensors that do: their levels
-/// then say how well poses and sensors agree, and nothing is known better than that.
+/// The levels with what the sensors, and the poses, are off by over tenths of a second.
 pub(crate) fn with_coloured(sequence: &StateSequence, poses: &Poses, white: Levels) -> Levels {
     let mut all = white;
-    for span_s in SPANS_S {
-        let rows = rows(sequence, poses, span_s);
-        let noise = [
-            white.position_m * 2_f64.sqrt() / span_s,
-            white.heading_rad * 2_f64.sqrt() / span_s,
-            white.position_m * 6_f64.sqrt() / (span_s * span_s),
-            white.position_m * 6_f64.sqrt() / (span_s * span_s),
-        ];
-        let levels = [&mut all.v_x_mps, &mut all.yaw_rate_radps, &mut all.a_x_mps2, &mut all.a_y_mps2];
-        for ((level, rows), noise) in levels.into_iter().zip(&rows).zip(noise) {
+    let rows = SPANS_S.map(|span_s| rows(sequence, poses, span_s));
+    let of = |channel: usize, white: f64| {
+        let growth: Vec<Growth> = SPANS_S
+            .into_iter()
+            .zip(&rows)
+            .filter_map(|(span_s, rows)| Growth::of(&rows[channel], span_s, white * 2_f64.sqrt()))
+            .collect();
+        told_apart(&growth)
+    };
+    for (channel, white, level, wander) in [
+        (0, white.position_m, &mut all.v_x_mps, &mut all.position_wander),
+        (1, white.heading_rad, &mut all.yaw_rate_radps, &mut all.heading_wander),
+    ] {
+        let Some(found) = of(channel, white) else { continue };
+        *level = level.max(found.sensor);
+        if found.wander.sigma > wander.sigma {
+            *wander = found.wander;
+        }
+    }
+    for (span_s, rows) in SPANS_S.into_iter().zip(&rows) {
+        let wander = all.position_wander;
+        let alike = |spans: f64| (-spans * span_s / wander.time_s).exp();
+        let wandered = wander.sigma.powi(2) * (6.0 - 8.0 * alike(1.0) + 2.0 * alike(2.0));
+        let noise = (6.0 * white.position_m.powi(2) + wandered).sqrt() / (span_s * span_s);
+        for (level, rows) in [&mut all.a_x_mps2, &mut all.a_y_mps2].into_iter().zip(&rows[2..]) {
             if let Some((left, samples)) = left(rows)
                 && left > BEYOND * noise
             {
@@ -45,6 +64,98 @@ pub(crate) fn with_coloured(sequence: &StateSequence, poses: &Poses, white: Leve
         }
     }
     all
+}
+
+/// What remains of the change over spans of one length.
+struct Growth {
+    span_s: f64,
+    /// Variance of the difference of the changes, beyond the poses' white noise.
+    beyond: f64,
+    /// Standard deviation of that.
+    sigma: f64,
+    /// Samples of the sensor in a span.
+    samples: f64,
+}
+
+impl Growth {
+    /// `noise` is what white noise of the poses makes of a change.
+    fn of(rows: &[Row], span_s: f64, noise: f64) -> Option<Self> {
+        let (left, samples) = left(rows)?;
+        let variance = (left * span_s).powi(2);
+        // Half of the spans overlap, and a variance by a median is as good as one by a third of the points (the median absolute deviation's efficiency is 0.37).
+        let points = 0.37 * 0.5 * rows.len() as f64;
+        Some(Self {
+            span_s,
+            beyond: variance - noise * noise,
+            sigma: variance * (2.0 / points).sqrt(),
+            samples,
+        })
+    }
+}
+
+/// A law of growth, as it fits.
+struct Law {
+    time_s: f64,
+    size: f64,
+    chi2: f64,
+}
+
+/// What of it is whose.
+struct Apart {
+    /// White noise of the sensor that is worth as much.
+    sensor: f64,
+    wander: Wander,
+}
+
+/// Whose the growth is: least squares of each law of growth to it, each law weighted by its likelihood, laws of either side as likely beforehand.
+/// `None` where there is nothing beyond the white noise.
+fn told_apart(growth: &[Growth]) -> Option<Apart> {
+    if growth.len() < 2 || growth.iter().all(|g| (g.beyond / g.sigma) < 1.0) {
+        return None;
+    }
+    // A Gauss-Markov localisation: gamma(0) - gamma(s), twice. A sensor: the integral of a Gauss-Markov error over the span.
+    let bounded = |span_s: f64, time_s: f64| 2.0 * (1.0 - (-span_s / time_s).exp());
+    let adding = |span_s: f64, time_s: f64| span_s - time_s * (1.0 - (-span_s / time_s).exp());
+    let fitted = |law: &dyn Fn(f64) -> f64| {
+        let (mut up, mut down) = (0.0, 0.0);
+        for g in growth {
+            let shape = law(g.span_s) / g.sigma;
+            up += shape * g.beyond / g.sigma;
+            down += shape * shape;
+        }
+        let size = (up / down).max(0.0);
+        let chi2: f64 = growth.iter().map(|g| ((g.beyond - size * law(g.span_s)) / g.sigma).powi(2)).sum();
+        (size, chi2)
+    };
+    let of = |times_s: &[f64], law: &dyn Fn(f64, f64) -> f64| -> Vec<Law> {
+        let law = |&time_s: &f64| {
+            let (size, chi2) = fitted(&|span_s| law(span_s, time_s));
+            Law { time_s, size, chi2 }
+        };
+        times_s.iter().map(law).collect()
+    };
+    let poses = of(&FORGETS_S, &bounded);
+    let sensor = of(&[&[WHITE_S], &FORGETS_S[..]].concat(), &adding);
+    let least = poses.iter().chain(&sensor).map(|l| l.chi2).fold(f64::INFINITY, f64::min);
+    let weight = |law: &Law| (-0.5 * (law.chi2 - least)).exp();
+    let mean = |laws: &[Law], f: &dyn Fn(&Law) -> f64| {
+        laws.iter().map(|law| weight(law) * f(law)).sum::<f64>() / laws.len() as f64
+    };
+    let either = mean(&poses, &|_| 1.0) + mean(&sensor, &|_| 1.0);
+    let variance = mean(&poses, &|law| law.size) / either;
+    // How fast it spreads at first.
+    let spread = mean(&poses, &|law| law.size / law.time_s) / either;
+    // White noise that has added up to as much over the longest span looked at.
+    let longest = growth.iter().max_by(|a, b| a.span_s.total_cmp(&b.span_s))?;
+    let white =
+        |law: &Law| law.size * adding(longest.span_s, law.time_s) / longest.span_s.powi(2) * longest.samples;
+    Some(Apart {
+        sensor: (mean(&sensor, &white) / either).sqrt(),
+        wander: Wander {
+            sigma: variance.sqrt(),
+            time_s: if spread > 0.0 { variance / spread } else { FORGETS_S[0] },
+        },
+    })
 }
 
 fn rows(sequence: &StateSequence, poses: &Poses, span_s: f64) -> [Vec<Row>; 4] {

@@ -6,8 +6,8 @@ use serde::Serialize;
 use crate::events::Observation;
 use crate::levels::Levels;
 use crate::state::{
-    A_X, A_Y, ALPHA, ARM, B_R, B_X, B_Y, Drive, LATE, Matrix, N, PSI, R, RATE, SCALE, TILT, V_X, V_Y, Vector,
-    X, Y, jacobian, rate, step,
+    A_X, A_Y, ALPHA, ARM, B_R, B_X, B_Y, Drive, LATE, MOTION, Matrix, N, OFF, PLACE, PSI, R, RATE, SCALE,
+    TILT, V_X, V_Y, Vector, X, Y, jacobian, rate, step,
 };
 
 /// v_x, v_y and yaw rate with their covariance.
@@ -45,8 +45,6 @@ const GATE_POSE: f64 = 16.27;
 const GATE_ONE: f64 = 10.83;
 /// So many poses in a row that contradict are a jump of the localisation.
 pub(crate) const JUMP_POSES: usize = 4;
-/// Place, heading, speeds, yaw rate and accelerations: the states before the constants.
-const MOTION: usize = 9;
 
 /// The filter, live.
 #[derive(Debug, Clone)]
@@ -96,6 +94,9 @@ impl Filter {
             spread[place] = f64::powi(sigma, 2);
         }
         let drive = levels.drive();
+        for (place, wander) in OFF.into_iter().zip(drive.wander()) {
+            spread[place] = wander.sigma.powi(2);
+        }
         Self {
             levels,
             drive,
@@ -209,7 +210,7 @@ impl Filter {
         // A pose that is later than was taken off says where the car was.
         let late_s = self.s[LATE];
         let moved = rate(&self.s);
-        let predicted = [X, Y, PSI].map(|place| self.s[place] - late_s * moved[place]);
+        let predicted = [X, Y, PSI].map(|place| self.s[place] + self.s[OFF[place]] - late_s * moved[place]);
         let innovation = Vector3::new(
             x_m - predicted[0],
             y_m - predicted[1],
@@ -218,6 +219,7 @@ impl Filter {
         let mut h: SMatrix<f64, 3, N> = -late_s * jacobian(&self.s).fixed_rows::<3>(0).into_owned();
         for place in 0..3 {
             h[(place, place)] += 1.0;
+            h[(place, OFF[place])] += 1.0;
             h[(place, LATE)] = -moved[place];
         }
         let noise = Matrix3::from_diagonal(&Vector3::new(
@@ -249,10 +251,10 @@ impl Filter {
     /// that is not known any more.
     fn begin_anew(&mut self, x_m: f64, y_m: f64, yaw_rad: f64) {
         self.contradicting = 0;
-        self.anew = 3;
+        self.anew = PLACE;
         if self.agreeing < JUMP_POSES && !self.jumps_s.is_empty() {
             self.anew = MOTION;
-            for place in 3..MOTION {
+            for place in PLACE..MOTION {
                 for other in 0..N {
                     self.p[(place, other)] = 0.0;
                     self.p[(other, place)] = 0.0;
@@ -271,13 +273,19 @@ impl Filter {
         let (late_s, moved) = (self.s[LATE], rate(&self.s));
         let values = [x_m + late_s * moved[X], y_m + late_s * moved[Y], yaw_rad + late_s * moved[PSI]];
         let sigmas = [self.levels.position_m, self.levels.position_m, self.levels.heading_rad];
-        for place in 0..3 {
-            self.s[place] = values[place];
+        for place in 0..PLACE {
             for other in 0..N {
                 self.p[(place, other)] = 0.0;
                 self.p[(other, place)] = 0.0;
             }
-            self.p[(place, place)] = sigmas[place].powi(2);
+        }
+        for place in 0..3 {
+            // What it is off by now is known by nothing.
+            let (off, off2) = (OFF[place], self.spread[OFF[place]]);
+            (self.s[place], self.s[off]) = (values[place], 0.0);
+            self.p[(place, place)] = sigmas[place].powi(2) + off2;
+            self.p[(off, off)] = off2;
+            (self.p[(place, off)], self.p[(off, place)]) = (-off2, -off2);
         }
     }
 }

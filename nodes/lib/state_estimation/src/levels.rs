@@ -6,6 +6,15 @@ use serde::Serialize;
 use crate::coloured::with_coloured;
 use crate::state::Drive;
 
+/// What a localisation is off by from one moment to the next in the same way: a first-order Gauss-Markov process.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Wander {
+    /// Its standard deviation, m or rad.
+    pub sigma: f64,
+    /// Over which it forgets, s.
+    pub time_s: f64,
+}
+
 /// Standard deviations of white noise, and strengths of what drives the motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Levels {
@@ -13,6 +22,10 @@ pub struct Levels {
     pub position_m: f64,
     /// Of its heading.
     pub heading_rad: f64,
+    /// What each coordinate of the poses is off by beside that.
+    pub position_wander: Wander,
+    /// What their heading is.
+    pub heading_wander: Wander,
     /// Of the speed.
     pub v_x_mps: f64,
     /// Of the lateral speed, where one is measured.
@@ -61,6 +74,9 @@ impl Levels {
         let levels = Self {
             position_m: position,
             heading_rad: heading,
+            // Small beside the noise where nothing speaks for more, and not nothing: a covariance has to have an inverse.
+            position_wander: Wander { sigma: 0.1 * position, time_s: 0.5 },
+            heading_wander: Wander { sigma: 0.1 * heading, time_s: 0.5 },
             v_x_mps: v_x_noise,
             v_y_mps: white_noise(&wide(&sequence.v_y_mps)).max(LEAST[2]),
             yaw_rate_radps: r_noise,
@@ -76,7 +92,7 @@ impl Levels {
 
     pub(crate) fn drive(&self) -> Drive {
         let [a_x, a_y, alpha] = self.change;
-        Drive { a_x, a_y, alpha }
+        Drive { a_x, a_y, alpha, position: self.position_wander, heading: self.heading_wander }
     }
 }
 

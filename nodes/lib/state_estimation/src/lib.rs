@@ -8,10 +8,11 @@
 //! psi' = r                           r'   = alpha           alpha' = white noise
 //! ```
 //!
-//! with constants beside: biases of the accelerometers and of the gyroscope, the place of the inertial unit ahead of the point of the poses,
+//! with what the localisation is off by for tenths of a second (a first-order Gauss-Markov process on each coordinate of a pose), and constants beside: biases of the accelerometers and of the gyroscope, the place of the inertial unit ahead of the point of the poses,
 //! and the scales of speed, yaw rate and lateral acceleration (a body that rolls adds to it). [`smooth`] runs an extended Kalman filter forward and a Rauch-Tung-Striebel smoother back (offline); [`Filter`] is
 //! the forward half alone (live). How strong the white noises are, and how noisy each sensor is, is taken from the recording itself
-//! ([`Levels`]): its noise from sample to sample, and what it leaves beside the poses over tenths of a second. A pose that contradicts what is known by more than chance does is left out; where poses go on contradicting, the
+//! ([`Levels`]): its noise from sample to sample, and what poses and sensors leave beside each other over tenths of a second, which by its growth with the span is the sensor's or the
+//! localisation's. A pose that contradicts what is known by more than chance does is left out; where poses go on contradicting, the
 //! localisation has jumped, and position and heading begin anew. The delay of the poses is that at which their heading follows the integrated
 //! yaw rate best.
 //!
@@ -28,5 +29,5 @@ mod state;
 pub use error::StateError;
 pub use events::Observation;
 pub use filter::{Filter, Motion};
-pub use levels::Levels;
+pub use levels::{Levels, Wander};
 pub use smoother::{Smoothed, filled, smooth};

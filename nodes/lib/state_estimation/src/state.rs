@@ -2,41 +2,58 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use crate::levels::Wander;
+
 /// Size of the state.
-pub(crate) const N: usize = 17;
+pub(crate) const N: usize = 20;
 pub(crate) type Vector = SVector<f64, N>;
 pub(crate) type Matrix = SMatrix<f64, N, N>;
 
 pub(crate) const X: usize = 0;
 pub(crate) const Y: usize = 1;
 pub(crate) const PSI: usize = 2;
-pub(crate) const V_X: usize = 3;
-pub(crate) const V_Y: usize = 4;
-pub(crate) const R: usize = 5;
-pub(crate) const A_X: usize = 6;
-pub(crate) const A_Y: usize = 7;
-pub(crate) const ALPHA: usize = 8;
+/// How far the localisation has wandered off: position, m, and heading, rad.
+pub(crate) const OFF: [usize; 3] = [3, 4, 5];
+/// Place, heading and what they are off by.
+pub(crate) const PLACE: usize = 6;
+pub(crate) const V_X: usize = 6;
+pub(crate) const V_Y: usize = 7;
+pub(crate) const R: usize = 8;
+pub(crate) const A_X: usize = 9;
+pub(crate) const A_Y: usize = 10;
+pub(crate) const ALPHA: usize = 11;
+/// Place, speeds, yaw rate and accelerations: the states before the constants.
+pub(crate) const MOTION: usize = 12;
 /// Biases of the accelerometers, m/s2, and of the yaw rate, rad/s.
-pub(crate) const B_X: usize = 9;
-pub(crate) const B_Y: usize = 10;
-pub(crate) const B_R: usize = 11;
+pub(crate) const B_X: usize = 12;
+pub(crate) const B_Y: usize = 13;
+pub(crate) const B_R: usize = 14;
 /// How far ahead of the point of the poses the inertial unit sits, m.
-pub(crate) const ARM: usize = 12;
+pub(crate) const ARM: usize = 15;
 /// Scale of the speed: reported over true, less one.
-pub(crate) const SCALE: usize = 13;
+pub(crate) const SCALE: usize = 16;
 /// How much later poses are than their delay was taken to be, s.
-pub(crate) const LATE: usize = 14;
+pub(crate) const LATE: usize = 17;
 /// Scale of the lateral acceleration: reported over true, less one.
-pub(crate) const TILT: usize = 15;
+pub(crate) const TILT: usize = 18;
 /// Scale of the yaw rate: reported over true, less one.
-pub(crate) const RATE: usize = 16;
+pub(crate) const RATE: usize = 19;
 
-/// Strengths of the white noises that drive a_x, a_y (m2/s5) and alpha (rad2/s5).
+/// Strengths of the white noises that drive a_x, a_y (m2/s5) and alpha (rad2/s5), and how the localisation wanders.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Drive {
     pub(crate) a_x: f64,
     pub(crate) a_y: f64,
     pub(crate) alpha: f64,
+    pub(crate) position: Wander,
+    pub(crate) heading: Wander,
+}
+
+impl Drive {
+    /// How each of [`OFF`] wanders.
+    pub(crate) fn wander(&self) -> [Wander; 3] {
+        [self.position, self.position, self.heading]
+    }
 }
 
 /// The rate of change of the state.
@@ -76,9 +93,9 @@ pub(crate) fn jacobian(s: &Vector) -> Matrix {
 /// State, transition and noise after a step: midpoint rule, transition to second order.
 pub(crate) fn step(s: &Vector, dt_s: f64, drive: &Drive) -> (Vector, Matrix, Matrix) {
     let middle = s + rate(s) * (0.5 * dt_s);
-    let next = s + rate(&middle) * dt_s;
+    let mut next = s + rate(&middle) * dt_s;
     let a = jacobian(&middle) * dt_s;
-    let transition = Matrix::identity() + a + a * a * 0.5;
+    let mut transition = Matrix::identity() + a + a * a * 0.5;
     let mut noise = Matrix::zeros();
     // An acceleration that walks makes a speed that walks along: the exact covariance of the pair.
     for (rate, value, strength) in [(A_X, V_X, drive.a_x), (A_Y, V_Y, drive.a_y), (ALPHA, R, drive.alpha)] {
@@ -87,6 +104,12 @@ pub(crate) fn step(s: &Vector, dt_s: f64, drive: &Drive) -> (Vector, Matrix, Mat
         noise[(rate, value)] = strength * dt_s * dt_s / 2.0;
         noise[(value, rate)] = noise[(rate, value)];
     }
+    for (place, wander) in OFF.into_iter().zip(drive.wander()) {
+        let kept = (-dt_s / wander.time_s).exp();
+        next[place] = kept * s[place];
+        transition[(place, place)] = kept;
+        noise[(place, place)] = wander.sigma.powi(2) * (1.0 - kept * kept);
+    }
     (next, transition, noise)
 }
 
@@ -94,11 +117,13 @@ pub(crate) fn step(s: &Vector, dt_s: f64, drive: &Drive) -> (Vector, Matrix, Mat
 mod tests {
     use super::*;
 
+    const STILL: Wander = Wander { sigma: 0.0, time_s: 0.5 };
+
     #[test]
     fn the_transition_is_the_derivative_of_the_step() {
         let mut s = Vector::from_fn(|i, _| 0.3 + 0.17 * i as f64);
         s[V_X] = 5.0;
-        let drive = Drive { a_x: 1.0, a_y: 1.0, alpha: 1.0 };
+        let drive = Drive { a_x: 1.0, a_y: 1.0, alpha: 1.0, position: STILL, heading: STILL };
         let (_, transition, _) = step(&s, 0.01, &drive);
         for j in 0..N {
             let mut up = s;
@@ -119,7 +144,7 @@ mod tests {
         s[R] = 1.0;
         s[A_Y] = 4.0;
         for _ in 0..628 {
-            s = step(&s, 0.01, &Drive { a_x: 0.0, a_y: 0.0, alpha: 0.0 }).0;
+            s = step(&s, 0.01, &Drive { a_x: 0.0, a_y: 0.0, alpha: 0.0, position: STILL, heading: STILL }).0;
         }
         approx::assert_abs_diff_eq!(s[V_X], 4.0, epsilon = 1e-3);
         approx::assert_abs_diff_eq!(s[V_Y], 0.0, epsilon = 1e-3);

@@ -77,7 +77,7 @@ pub(super) fn slope_beside(first: &[f64], second: &[f64], beside: &[&[f64]], lea
         .collect();
     let usable: Vec<usize> =
         (0..rows.len()).filter(|&i| first[i].is_finite() && rows[i].iter().all(|v| v.is_finite())).collect();
-    let fit = |kept: &[usize]| -> Option<Vec<f64>> {
+    let fit = |kept: &[usize]| -> Option<(Vec<f64>, Vec<f64>)> {
         let mut weights = vec![1.0; kept.len()];
         let mut found = solve(&rows, first, kept, &weights)?;
         for turn in 0..20 {
@@ -98,7 +98,7 @@ pub(super) fn slope_beside(first: &[f64], second: &[f64], beside: &[&[f64]], lea
             }
             found = solve(&rows, first, kept, &weights)?;
         }
-        Some(found)
+        Some((found, weights))
     };
     // What of the second the others do not explain.
     let others: Vec<Vec<f64>> = rows.iter().map(|r| r[1..].to_vec()).collect();
@@ -110,13 +110,44 @@ pub(super) fn slope_beside(first: &[f64], second: &[f64], beside: &[&[f64]], lea
     if usable.len() < 20 || (own / usable.len() as f64).sqrt() < least {
         return None;
     }
-    let found = fit(&usable)?;
+    let (found, weights) = fit(&usable)?;
     let value = found[0];
     let (low, high) = interval(value, usable.len(), |kept| {
         let kept: Vec<usize> = kept.iter().map(|&k| usable[k]).collect();
-        fit(&kept).map(|f| f[0])
+        fit(&kept).map(|(f, _)| f[0])
     })?;
+    // Of few points, blocks left out in turn tell too little of the spread: the interval is not narrower than that of independent noise.
+    let half = half_width(&rows, first, &usable, &weights, &found)?;
+    let (low, high) = (low.min(value - half), high.max(value + half));
     Some(Slope { value, low, high, offset: found[found.len() - 1] })
+}
+
+/// Half the 90 % interval of the first coefficient of a weighted fit, its noise independent from point to point.
+fn half_width(
+    rows: &[Vec<f64>],
+    first: &[f64],
+    kept: &[usize],
+    weights: &[f64],
+    found: &[f64],
+) -> Option<f64> {
+    let others: Vec<Vec<f64>> = rows.iter().map(|r| r[1..].to_vec()).collect();
+    let second: Vec<f64> = rows.iter().map(|r| r[0]).collect();
+    let shared = solve(&others, &second, kept, weights)?;
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let (mut own, mut left, mut points) = (0.0, 0.0, 0.0);
+    for (&i, w) in kept.iter().zip(weights) {
+        own += w * (second[i] - dot(&others[i], &shared)).powi(2);
+        left += w * (first[i] - dot(&rows[i], found)).powi(2);
+        points += w;
+    }
+    let freedom = points - found.len() as f64;
+    if own <= 0.0 || freedom < 1.0 {
+        return None;
+    }
+    // 90 % of a t distribution, by its expansion about the normal one (Abramowitz and Stegun 26.7.5).
+    let z: f64 = 1.645;
+    let t = z + (z.powi(3) + z) / (4.0 * freedom);
+    Some(t * (left / freedom / own).sqrt())
 }
 
 /// Root mean square of what others and an offset leave of a series, the largest twentieth apart; `None` where there is too little.
