@@ -14,6 +14,8 @@ use crate::levels::{Levels, Wander};
 const SPANS_S: [f64; 5] = [0.1, 0.2, 0.4, 0.8, 1.6];
 /// A difference tells of a sensor where it is larger than what the poses' noise makes by this.
 const BEYOND: f64 = 1.5;
+/// A turn within a span beyond which the way ahead mixes with the one to the side.
+const MOST_TURN_RAD: f64 = 0.5;
 /// Spans that a judgement needs.
 const LEAST_SPANS: usize = 20;
 /// Times over which a localisation, or a sensor, may forget what it is off by.
@@ -182,6 +184,11 @@ fn rows(sequence: &StateSequence, poses: &Poses, span_s: f64) -> [Vec<Row>; 4] {
         let share = ((t - time(k - 1)) / (time(k) - time(k - 1))).clamp(0.0, 1.0);
         integral[k - 1] + (integral[k] - integral[k - 1]) * share
     };
+    let value = |values: &[f32], t: f64| {
+        let k = sequence.time_s.partition_point(|&s| f64::from(s) <= t).clamp(1, n - 1);
+        let share = ((t - time(k - 1)) / (time(k) - time(k - 1))).clamp(0.0, 1.0);
+        f64::from(values[k - 1]) + f64::from(values[k] - values[k - 1]) * share
+    };
     let next = |from: usize| {
         let t = poses.time_s[from];
         let to = from + poses.time_s[from..].partition_point(|&p| p < t + span_s - 1e-6);
@@ -217,15 +224,33 @@ fn rows(sequence: &StateSequence, poses: &Poses, span_s: f64) -> [Vec<Row>; 4] {
                 samples: count as f64,
             });
         }
-        if has_speed {
-            let (sin, cos) = (0.5 * (poses.yaw_rad[here] + poses.yaw_rad[b])).sin_cos();
+        if has_speed && turned.abs() < MOST_TURN_RAD {
+            // Seen from the heading in the middle. Without a yaw rate the car turns evenly, as far as anything tells.
+            let middle = 0.5 * (poses.yaw_rad[b] + poses.yaw_rad[here]);
+            let (sin, cos) = middle.sin_cos();
             let along = (poses.x_m[b] - poses.x_m[here]) * cos + (poses.y_m[b] - poses.y_m[here]) * sin;
-            // The way is the arc, and poses give its chord.
-            let half = 0.5 * turned.abs();
-            let arc = if half > 1e-3 { half / half.sin() } else { 1.0 };
+            let heading = |t: f64| match &turns {
+                Some(turns) => at(turns, t) - 0.5 * (at(turns, from_s) + at(turns, to_s)),
+                None => ((t - from_s) / (to_s - from_s) - 0.5) * turned,
+            };
+            let (mut forward, mut slipping) = (0.0, 0.0);
+            let mut last: Option<(f64, f64, f64)> = None;
+            let inside = samples(from_s, to_s).map(time).filter(|&t| t > from_s && t < to_s);
+            for t in [from_s].into_iter().chain(inside).chain([to_s]) {
+                let (sin, cos) = heading(t).sin_cos();
+                let rate = rates.map_or(turned / (to_s - from_s), |rates| value(rates, t));
+                let now = (t, value(&sequence.v_x_mps, t) * cos, -rate * sin);
+                if let Some(before) = last {
+                    let dt_s = t - before.0;
+                    forward += 0.5 * (now.1 + before.1) * dt_s;
+                    slipping += 0.5 * (now.2 + before.2) * dt_s;
+                }
+                last = Some(now);
+            }
             rows[0].push(Row {
-                by_pose: along * arc.clamp(1.0, 2.0) / (to_s - from_s),
-                beside: [mean(&ways), 1.0, change(&ways), 0.0],
+                by_pose: along / (to_s - from_s),
+                // v_y is nearly proportional to the yaw rate while the speed hardly changes.
+                beside: [forward / (to_s - from_s), 1.0, change(&ways), slipping / (to_s - from_s)],
                 samples: count as f64,
             });
         }

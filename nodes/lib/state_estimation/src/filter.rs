@@ -222,11 +222,14 @@ impl Filter {
             h[(place, OFF[place])] += 1.0;
             h[(place, LATE)] = -moved[place];
         }
-        let noise = Matrix3::from_diagonal(&Vector3::new(
+        let here = Matrix3::from_diagonal(&Vector3::new(
             self.levels.position_m.powi(2),
             self.levels.position_m.powi(2),
             self.levels.heading_rad.powi(2),
         ));
+        // A stamp that is off a little is off along the way.
+        let along = Vector3::new(moved[X], moved[Y], moved[PSI]) * self.levels.pose_stamp_s;
+        let noise = here + along * along.transpose();
         let columns = self.p * h.transpose();
         let Some(inverse) = (h * columns + noise).try_inverse() else { return };
         let distance = (innovation.transpose() * inverse * innovation)[0];

@@ -26,6 +26,8 @@ pub struct Levels {
     pub position_wander: Wander,
     /// What their heading is.
     pub heading_wander: Wander,
+    /// Of their stamps.
+    pub pose_stamp_s: f64,
     /// Of the speed.
     pub v_x_mps: f64,
     /// Of the lateral speed, where one is measured.
@@ -77,6 +79,7 @@ impl Levels {
             // Small beside the noise where nothing speaks for more, and not nothing: a covariance has to have an inverse.
             position_wander: Wander { sigma: 0.1 * position, time_s: 0.5 },
             heading_wander: Wander { sigma: 0.1 * heading, time_s: 0.5 },
+            pose_stamp_s: stamp_jitter_s(&time_s, &v_x, poses, position),
             v_x_mps: v_x_noise,
             v_y_mps: white_noise(&wide(&sequence.v_y_mps)).max(LEAST[2]),
             yaw_rate_radps: r_noise,
@@ -94,6 +97,43 @@ impl Levels {
         let [a_x, a_y, alpha] = self.change;
         Drive { a_x, a_y, alpha, position: self.position_wander, heading: self.heading_wander }
     }
+}
+
+/// Standard deviation of the poses' stamps about the speed's clock. A stamp that is off makes the way to its pose longer by as much as it makes the next one
+/// shorter: ways from pose to pose, less the speed's, that follow one another are correlated by it, beyond what the poses' own noise does, by the square of the
+/// speed; a speed's own errors do not do so. Some stamps are off by far (a frame that came late): it is the mean that counts, without the fiftieth that may be
+/// jumps.
+fn stamp_jitter_s(time_s: &[f64], v_x: &[f64], poses: &Poses, position_m: f64) -> f64 {
+    /// From one pose to the next, a way worth comparing.
+    const LONGEST_S: f64 = 0.25;
+    let at = |t: f64| {
+        let k = time_s.partition_point(|&s| s <= t).clamp(1, time_s.len() - 1);
+        let share = ((t - time_s[k - 1]) / (time_s[k] - time_s[k - 1])).clamp(0.0, 1.0);
+        v_x[k - 1] + (v_x[k] - v_x[k - 1]) * share
+    };
+    if time_s.len() < 2 {
+        return 0.0;
+    }
+    // How much farther than by the speed, and the speed.
+    let farther = |k: usize| {
+        let (from_s, to_s) = (poses.time_s[k - 1], poses.time_s[k]);
+        let (sin, cos) = (0.5 * (poses.yaw_rad[k] + poses.yaw_rad[k - 1])).sin_cos();
+        let along = (poses.x_m[k] - poses.x_m[k - 1]) * cos + (poses.y_m[k] - poses.y_m[k - 1]) * sin;
+        let v_mps = 0.5 * (at(from_s) + at(to_s));
+        (to_s - from_s < LONGEST_S).then_some((along - v_mps * (to_s - from_s), v_mps))
+    };
+    let ways: Vec<Option<(f64, f64)>> = (1..poses.time_s.len()).map(farther).collect();
+    let mut pairs: Vec<(f64, f64)> = ways
+        .windows(2)
+        .filter_map(|w| {
+            let [(a, v_a), (b, v_b)] = [w[0]?, w[1]?];
+            Some((-a * b, (0.5 * (v_a + v_b)).powi(2)))
+        })
+        .collect();
+    pairs.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
+    pairs.truncate(pairs.len() * 49 / 50);
+    let (beyond, speed2) = pairs.iter().fold((0.0, 0.0), |(a, b), p| (a + p.0 - position_m.powi(2), b + p.1));
+    if speed2 > 0.0 { (beyond / speed2).max(0.0).sqrt() } else { 0.0 }
 }
 
 /// Speeds by the distance from pose to pose over a tenth of a second.
