@@ -79,6 +79,8 @@ class Observer:
         self.residuals = reader("rt/s4_residual/residual", "gripsight_msgs", "Residual", "reliable")
         self.sets = reader("rt/identifier/pacejka", "gripsight_msgs", "PacejkaParams", "latched")
         self.sent, self.latencies, self.taken, self.distance_m, self.running = {}, [], 0, 0.0, True
+        # Residuals whose odometry this process has not seen yet: the two come by two sockets.
+        self.ahead = {}
         self.lock = threading.Lock()
         threading.Thread(target=self.listen, daemon=True).start()
 
@@ -90,16 +92,22 @@ class Observer:
                     now, stamp = time.monotonic(), (got.header.stamp.sec, got.header.stamp.nanosec)
                     here = got.pose.pose.position
                     with self.lock:
-                        self.sent[stamp] = now
+                        if self.ahead.pop(stamp, None) is None:
+                            self.sent[stamp] = now
+                        else:
+                            self.latencies.append(0.0)
                         if last is not None:
                             self.distance_m += float(np.hypot(here.x - last[0], here.y - last[1]))
                     last = here.x, here.y
             for got in self.residuals.take(N=50):
                 if got.sample_info.valid_data:
                     with self.lock:
-                        written = self.sent.pop((got.header.stamp.sec, got.header.stamp.nanosec), None)
+                        stamp = (got.header.stamp.sec, got.header.stamp.nanosec)
+                        written = self.sent.pop(stamp, None)
                         if written is not None:
                             self.latencies.append(time.monotonic() - written)
+                        else:
+                            self.ahead[stamp] = time.monotonic()
             self.taken += sum(got.sample_info.valid_data for got in self.sets.take(N=50))
             time.sleep(0.0005)
 
@@ -109,6 +117,7 @@ class Observer:
             old = [stamp for stamp, at in self.sent.items() if time.monotonic() - at > 1.0]
             for stamp in old:
                 del self.sent[stamp]
+            self.ahead = {stamp: at for stamp, at in self.ahead.items() if time.monotonic() - at < 1.0}
             latencies, self.latencies = self.latencies, []
         return len(old), latencies
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from envelope import HARMFUL, number, quantiles, rows, wilson, worst
 
 HERE = Path(__file__).parent
-PER_G = 180 / math.pi * 10
 
 
 def plant(row):
@@ -60,7 +59,7 @@ def without_v_y():
         "",
         "v_y is 0 throughout and is estimated from poses as in [signals.md](signals.md).",
         "",
-        "| plant | recorded | usable sets | stiffness off, median size front / rear | inside its 90 % interval | understeer gradient, deg/g: true, off by (median sizes) | promised too much: harmful, most |",
+        "| plant | recorded | usable sets | stiffness off, median size front / rear | inside its 90 % interval | understeer gradient, deg/g: true, off by (median sizes); inside its 90 % interval | promised too much: harmful, most |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     median = lambda values: sorted(values)[len(values) // 2] if values else math.nan
@@ -68,10 +67,12 @@ def without_v_y():
         usable = [r for r in group if r["status"].startswith("accepted")]
         off = lambda a: 100 * median([abs(number(r[f"k_{a}"]) / number(r[f"k_true_{a}"]) - 1) for r in usable])
         over = [worst(r, "over") for r in usable]
-        gradient = lambda value: PER_G * median([abs(value(r)) for r in usable])
+        told = [r for r in usable if r["understeer_lo"] not in ("", "NaN")]
+        size = lambda value: median([abs(value(r)) for r in usable])
+        within = sum(number(r["understeer_lo"]) <= number(r["understeer_true"]) <= number(r["understeer_hi"]) for r in told)
         lines.append(
             f"| {name} | {what} | {len(usable)} of {len(group)} | {off('f'):.0f} % / {off('r'):.0f} % | {sum(inside(r, a) for r in usable for a in 'fr')} of {2 * len(usable)} "
-            f"| {gradient(lambda r: number(r['gradient_true'])):.2f}, {gradient(lambda r: number(r['gradient']) - number(r['gradient_true'])):.2f} "
+            f"| {size(lambda r: number(r['understeer_true'])):.2f}, {size(lambda r: number(r['understeer']) - number(r['understeer_true'])):.2f}; {within} of {len(told)} "
             f"| {sum(o > HARMFUL for o in over)}, {100 * max(over, default=math.nan):+.0f} % |"
         )
     return lines

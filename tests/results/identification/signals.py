@@ -53,8 +53,8 @@ def without_v_y():
         "",
         "v_y is 0 throughout. It is estimated from poses, inertial unit, yaw rate and v_x by a smoother that knows rigid-body motion and no tire.",
         "",
-        "| recorded | drives | usable sets | stiffness off, median size front / rear | within its 90 % interval | largest force off, front / rear | promised too much: harmful, most | v_y known to | delay found |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| recorded | drives | usable sets | stiffness off, median size front / rear | within its 90 % interval | largest force off, front / rear | understeer gradient, deg/g: true, off (median sizes); off by at most a tenth; within its 90 % interval | promised too much: harmful, most | v_y known to | delay found |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for what, group in groups(rows("signals_no_v_y.csv")).items():
         usable = [r for r in group if r["status"] in USABLE]
@@ -62,9 +62,13 @@ def without_v_y():
         force = lambda axle: percent(median(abs(number(r[f"d_{axle}"]) / number(r[f"d_true_{axle}"]) - 1) for r in usable), False)
         inside = sum(covered(r, axle) for r in usable for axle in "fr")
         over = [promised(r) for r in usable]
+        true, found, low, high = ([number(r[f"understeer{end}"]) for r in usable] for end in ("_true", "", "_lo", "_hi"))
+        gradient = f"{median(map(abs, true)):.2f}, {median(abs(f - t) for f, t in zip(found, true)):.2f}"
+        near = sum(abs(f - t) <= 0.1 * abs(t) for f, t in zip(found, true))
+        held = sum(l <= t <= h for l, t, h in zip(low, true, high))
         sigma, delay = median(number(r["v_y_sigma"]) for r in group), median(number(r["delay"]) for r in group)
         lines.append(
-            f"| {what} | {len(group)} | {len(usable)} | {size('f')} / {size('r')} | {inside} of {2 * len(usable)} | {force('f')} / {force('r')} "
+            f"| {what} | {len(group)} | {len(usable)} | {size('f')} / {size('r')} | {inside} of {2 * len(usable)} | {force('f')} / {force('r')} | {gradient}; {near} of {len(usable)}; {held} of {len(usable)} "
             f"| {sum(o > HARMFUL for o in over)}, {percent(max(over, default=math.nan))} "
             f"| {'measured' if math.isnan(sigma) else f'{sigma:.3f} m/s'} | {'-' if math.isnan(delay) else f'{delay:.3f} s'} |"
         )

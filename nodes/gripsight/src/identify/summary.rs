@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use gripsight_identification::{Outcome, Range};
 use gripsight_report::text::{interval, significant, with_interval};
-use gripsight_report::{drive_train, estimate, peak_friction, status};
+use gripsight_report::{drive_train, estimate, peak_friction, status, understeer};
 
 use super::progress::Timing;
 
@@ -100,6 +100,7 @@ fn tires(text: &mut String, result: &Outcome) {
     for (name, front, rear) in rows {
         let _ = writeln!(text, "{name:<28}{front:<32}{rear}");
     }
+    let _ = writeln!(text, "{:<28}{}", "understeer gradient deg/g", understeer(&result.handling));
 }
 
 fn signals(text: &mut String, result: &Outcome) {

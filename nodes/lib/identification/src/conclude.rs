@@ -14,9 +14,10 @@ use crate::picture::{curves, trace};
 use crate::rollout::{NAMES, PARAMETERS, SIGNALS, TireRollout, vector_of};
 use crate::tires::on_bound;
 use crate::{
-    Change, Config, Estimate, FrictionPrior, HorizonError, Identification, IdentificationError, Longitudinal,
-    Nuisance, Outcome, PeakFriction, PerAxle, ProvisionalSet, Range, Recorded, ResidualKind, Rmse,
-    RmseReport, RunKey, SignalCorrections, SignalEstimates, Source, Status, Trace, ValidWithin, WeakSignal,
+    Change, Config, Estimate, FrictionPrior, Handling, HorizonError, Identification, IdentificationError,
+    Longitudinal, Nuisance, Outcome, PeakFriction, PerAxle, ProvisionalSet, Range, Recorded, ResidualKind,
+    Rmse, RmseReport, RunKey, SignalCorrections, SignalEstimates, Source, Status, Trace, ValidWithin,
+    WeakSignal,
 };
 
 /// The residual loop has to beat the direct fit on the validation part by this share: of near equals the simpler wins.
@@ -87,6 +88,7 @@ pub(crate) fn refused(
         curves: PerAxle::default(),
         prior: request.prior,
         grip: None,
+        handling: Handling::unknown(),
         longitudinal: request.longitudinal.clone(),
         health: health.clone(),
         drive_next,
@@ -173,6 +175,7 @@ pub(crate) fn conclude(run: &Identification, converged: bool) -> Result<Outcome,
         curves: curves(run, &found),
         prior: run.prior,
         grip: run.grip.clone(),
+        handling: Handling::of(run, &found),
         longitudinal: run.longitudinal.clone(),
         health: run.data.health.clone(),
         drive_next: Vec::new(),

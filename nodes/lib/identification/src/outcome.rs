@@ -5,8 +5,8 @@ use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    AcceptedSet, Config, Estimate, FrictionPrior, Longitudinal, Nuisance, PerAxle, Range, Reading, Recorded,
-    RunKey, SignalCorrections, ValidWithin,
+    AcceptedSet, Config, Estimate, FrictionPrior, Handling, Longitudinal, Nuisance, PerAxle, Range, Reading,
+    Recorded, RunKey, SignalCorrections, ValidWithin,
 };
 
 /// What a set may be used for.
@@ -303,6 +303,8 @@ pub struct Outcome {
     pub prior: Option<FrictionPrior>,
     /// Whether the previous set still fits; `None` without one.
     pub grip: Option<Reading>,
+    /// Understeer gradient and handling diagram.
+    pub handling: Handling,
     /// What the drive tells of the drive train.
     pub longitudinal: Longitudinal,
     /// What is wrong with the data.

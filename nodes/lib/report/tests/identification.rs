@@ -6,9 +6,10 @@
 use std::f64::consts::TAU;
 
 use gripsight_identification::{
-    Change, Config, Estimate, FrictionPrior, Given, HorizonError, IterationRecord, LimitsAt, Longitudinal,
-    Nuisance, Outcome, PeakFriction, PerAxle, ProvisionalSet, Range, Recorded, Rmse, RmseReport, RunKey,
-    SignalCorrections, SignalEstimates, Source, Status, TireCurve, Told, Trace, ValidWithin, WeakSignal,
+    Change, Config, Estimate, FrictionPrior, Given, Handling, HandlingPoint, HorizonError, IterationRecord,
+    LimitsAt, Longitudinal, Nuisance, Outcome, PeakFriction, PerAxle, ProvisionalSet, Range, Recorded, Rmse,
+    RmseReport, RunKey, SignalCorrections, SignalEstimates, Source, Status, TireCurve, Told, Trace,
+    ValidWithin, WeakSignal,
 };
 use gripsight_report::{Header, IdentificationInput, identification_page};
 use gripsight_signals::DataHealth;
@@ -122,6 +123,14 @@ fn outcome() -> Outcome {
         },
         prior: Some(FrictionPrior { mu: 0.6, sigma: 0.1 }),
         grip: None,
+        handling: Handling {
+            understeer_gradient_rad_per_mps2: estimate(0.004, 0.001),
+            up_to_a_y_mps2: 2.3,
+            diagram: (1..=4)
+                .map(f64::from)
+                .map(|a_y_mps2| HandlingPoint { a_y_mps2, steering_rad: estimate(0.004 * a_y_mps2, 0.002) })
+                .collect(),
+        },
         longitudinal: Longitudinal::default(),
         health: DataHealth {
             samples: 6000,
@@ -192,6 +201,9 @@ fn the_verdict_says_what_the_figures_rest_on() {
         page(&accepted).contains("Accepted. Peak friction front 0.480 (0.460 … 0.520), rear")
             || page(&accepted).contains("Accepted. Peak friction front 0.480")
     );
+
+    // 0.004 rad per m/s2, plus or minus a quarter.
+    assert!(page(&accepted).contains("2.25 (1.69 … 2.81) up to 2.3 m/s2: understeers"));
 
     let mut within = outcome();
     within.status = Status::AcceptedWithin;

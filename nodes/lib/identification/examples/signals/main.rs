@@ -20,9 +20,11 @@ mod support;
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use gripsight_identification::{Config, FrictionPrior, Outcome, PerAxle, ResidualKind, Usable, identify};
+use gripsight_identification::{
+    Config, FrictionPrior, Outcome, PerAxle, ResidualKind, Usable, identify, understeer_rad,
+};
 use gripsight_signals::StateSequence;
-use gripsight_vehicle::{MagicFormula, VehicleParameters};
+use gripsight_vehicle::{GRAVITY_MPS2, MagicFormula, PacejkaParameters, VehicleParameters};
 use lies::{LOCALISATIONS, lies, localised};
 use support::{Truth, floor, read, read_with_truth, reference, truth_of};
 
@@ -34,7 +36,7 @@ fn quick() -> Config {
 }
 
 const HEADER: &str = "run,what,status,k_true_f,k_f,k_lo_f,k_hi_f,over_f,slip_f,d_true_f,d_f,k_true_r,k_r,k_lo_r,k_hi_r,over_r,slip_r,d_true_r,d_r,\
-    gradient_true,gradient,estimated,v_y_sigma,delay,reason";
+    understeer_true,understeer,understeer_lo,understeer_hi,estimated,v_y_sigma,delay,reason";
 
 /// Largest promise above the true curve within the slips, over the largest true force driven.
 fn over(set: &MagicFormula, truth: &MagicFormula, within_rad: f64, shown: f64) -> f64 {
@@ -44,9 +46,10 @@ fn over(set: &MagicFormula, truth: &MagicFormula, within_rad: f64, shown: f64) -
         .fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Difference of the slips that a lateral acceleration of a tenth of g takes front and rear, rad: the understeer gradient.
-fn gradient(stiffness: &PerAxle<f64>) -> f64 {
-    0.1 / stiffness.front - 0.1 / stiffness.rear
+/// Understeer gradient of the true curves over the lateral accelerations that the one found is of, rad per m/s2.
+fn true_gradient(truth: &PerAxle<MagicFormula>, up_to_a_y_mps2: f64) -> f64 {
+    let tires = PacejkaParameters { front: truth.front, rear: truth.rear };
+    understeer_rad(&tires, up_to_a_y_mps2 / GRAVITY_MPS2) / up_to_a_y_mps2
 }
 
 /// A row of one identification.
@@ -60,7 +63,7 @@ fn row(
 ) -> String {
     let outcome = match identify(sequence, vehicle, prior, None, &quick(), &mut |_| {}) {
         Ok(outcome) => outcome,
-        Err(error) => return format!("{run},{what},failed{}\"{error}\"", ",".repeat(22)),
+        Err(error) => return format!("{run},{what},failed{}\"{error}\"", ",".repeat(24)),
     };
     let mut cells = vec![run.to_owned(), what.to_owned(), outcome.status.name().to_owned()];
     let o = &outcome;
@@ -92,12 +95,11 @@ fn row(
         ]
     };
     cells.extend(axle(true).iter().chain(&axle(false)).map(|v| format!("{v:.4}")));
-    let normalized = |t: &PerAxle<MagicFormula>| t.map(|a| a.normalized_stiffness());
-    let found =
-        PerAxle { front: o.found.front.normalized_stiffness(), rear: o.found.rear.normalized_stiffness() };
-    let fitted = o.least_squares.is_some();
-    cells.push(format!("{:.5}", truth.map_or(f64::NAN, |t| gradient(&normalized(t)))));
-    cells.push(format!("{:.5}", if fitted { gradient(&found) } else { f64::NAN }));
+    let found = o.handling.understeer_gradient_rad_per_mps2;
+    let truth = truth.map_or(f64::NAN, |t| true_gradient(t, o.handling.up_to_a_y_mps2));
+    for value in [truth, found.value, found.low, found.high] {
+        cells.push(format!("{:.4}", (value * GRAVITY_MPS2).to_degrees()));
+    }
     cells.extend(estimated(o));
     cells.push(format!("\"{}\"", o.reasons.join(" | ").replace('"', "'")));
     cells.join(",")

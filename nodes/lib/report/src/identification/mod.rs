@@ -7,7 +7,7 @@ mod words;
 use gripsight_identification::{Method, Outcome, PerAxle, Source, Status};
 use maud::html;
 
-pub use words::{drive_train, estimate, peak_friction, status};
+pub use words::{drive_train, estimate, peak_friction, status, understeer};
 
 use crate::page::{Tone, figure, list, page, section};
 use crate::text::{fixed, percent, significant, with_interval};
@@ -52,6 +52,12 @@ pub fn identification_page(input: &IdentificationInput<'_>) -> Result<String, Re
             (section("Rear tires", false, &figure(&rear, "")?))
         }
         (section(tires, false, &tables::tires(outcome)))
+        @if fitted {
+            (section("Handling", false, &html! {
+                p { "Understeer gradient, degrees at the road wheels per g: " (understeer(&outcome.handling)) "." }
+                (figure(&pictures::handling(outcome), "")?)
+            }))
+        }
         @if fitted { (section("Taken out of the signals", false, &tables::signals(outcome))) }
 
         (section("Drive train", false, &tables::longitudinal(outcome)))

@@ -242,6 +242,27 @@ pub(super) fn horizon(outcome: &Outcome) -> [Chart; 2] {
     ]
 }
 
+/// The handling diagram: steering beyond that of the curve over lateral acceleration.
+pub(super) fn handling(outcome: &Outcome) -> Chart {
+    let points = &outcome.handling.diagram;
+    let line = points.iter().map(|p| (p.a_y_mps2, p.steering_rad.value.to_degrees()));
+    let band = points
+        .iter()
+        .map(|p| (p.a_y_mps2, p.steering_rad.low.to_degrees(), p.steering_rad.high.to_degrees()));
+    Chart::new(
+        "handling diagram",
+        Axis::new("lateral acceleration / (m/s²)").from_zero(),
+        Axis::new("steering beyond L/R / °"),
+    )
+    .sized(460, 230)
+    .with(Layer::Band { role: Role::Identified, name: "90 %".into(), points: band.collect() })
+    .with(Layer::Line {
+        role: Role::Identified,
+        name: "with the tires found".into(),
+        points: std::iter::once((0.0, 0.0)).chain(line).collect(),
+    })
+}
+
 /// The g-g diagram of the drive.
 pub(super) fn accelerations(outcome: &Outcome) -> Chart {
     let t = &outcome.trace;

@@ -1,10 +1,10 @@
 //! What an identification found, in words that page and terminal share.
 
 use gripsight_identification::{
-    Estimate, Given, LimitsAt, Longitudinal, Outcome, PeakFriction, Status, Told,
+    Estimate, Given, Handling, LimitsAt, Longitudinal, Outcome, PeakFriction, Status, Told,
 };
 
-use crate::text::{estimate_of, fixed, interval};
+use crate::text::{estimate_of, fixed, interval, significant, with_interval};
 
 /// An estimate with its interval behind it.
 #[must_use]
@@ -33,6 +33,23 @@ pub fn peak_friction(peak: &PeakFriction) -> String {
     } else {
         "not reached".to_owned()
     }
+}
+
+/// The understeer gradient in degrees of road-wheel angle per g, with what it says of the car.
+#[must_use]
+pub fn understeer(found: &Handling) -> String {
+    const DEG_PER_G: f64 = 180.0 / std::f64::consts::PI * 9.806_65;
+    let Estimate { value, low, high } = found.understeer_gradient_rad_per_mps2;
+    if !(low.is_finite() && high.is_finite()) {
+        return "unknown".to_owned();
+    }
+    let says = match (low > 0.0, high < 0.0) {
+        (true, _) => "understeers",
+        (_, true) => "oversteers",
+        _ => "neutral, as far as the data tell",
+    };
+    let (value, interval) = with_interval(value * DEG_PER_G, low * DEG_PER_G, high * DEG_PER_G);
+    format!("{value} ({interval}) up to {} m/s2: {says}", significant(found.up_to_a_y_mps2, 2))
 }
 
 /// What a drive tells of the drive train, a line each: what it is and what was found.
