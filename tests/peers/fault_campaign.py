@@ -181,6 +181,7 @@ class Run:
             # Both are the machine's own delays: the drive goes on during them, at its pace.
             common += ["-p", f"most_age_s:={AGE_S * self.args.rate}", "-p", f"most_ahead_s:={AHEAD_S * self.args.rate}"]
         command = [self.args.bin / (program or name), "--ros-args", *common, *arguments]
+        assert name not in self.processes or self.processes[name].poll() is not None, name
         self.processes[name] = subprocess.Popen([str(part) for part in command], stderr=log, stdout=log)
 
     def node(self, name, program=None, extra=()):
@@ -216,7 +217,8 @@ class Run:
             # Its plan counts from its first message, so the faults that had not begun are dropped.
             self.injector(0)
         elif kind == "second identifier":
-            self.node("identifier_2", "identifier")
+            # A name of its own: one that two draws share would leave the first running into the next runs.
+            self.node(f"identifier_{len(self.processes)}", "identifier")
         else:
             listener = f"listener_{len(self.processes)}"
             self.node(listener, "s4_residual", ["-r", f"__node:={listener}"])
@@ -278,6 +280,10 @@ class Run:
         for text, found in ((f"not whole: {torn}", torn), ("the last window was not identified", not identified), (f"silent: {silent}", silent), ("the camera reads nothing", not seen), (f"ended: {dead}", dead)):
             if found:
                 self.notes.append(text)
+        for message, too_much in zip(sets, promised):
+            if too_much > HARMFUL:
+                shake = message.handshake
+                self.notes.append(f"{too_much:.2f} too much: run {shake.run_id} sequence {shake.sequence_id} vehicle {shake.vehicle_hash} D {message.front.d:.3f} {message.rear.d:.3f}")
         if not usable:
             reasons = [m.reason for _, m in results()]
             self.notes.append("no usable set after the last fault: " + (reasons[-1] if reasons else "no result")[:160])

@@ -35,7 +35,7 @@ Parts of `/diagnostics` that every node has:
 
 /// Runs the node that the program calls `name`: `setup` declares its parameters and topics and
 /// gives its work. The process ends when the work does, or on SIGINT or SIGTERM: the work is dropped at its next `await`, and the
-/// process has ended two seconds later whatever it does. Where DDS has stopped, as it does when a suspended process goes on, or the
+/// process has ended two seconds later whatever it does. Where DDS has stopped, or the
 /// process holds more memory than the parameter `memory_limit_mb` allows, it starts anew in its place, with
 /// the same arguments; what it held is gone. With `--help` it prints `manual`, the text of the node's README,
 /// and ends.
@@ -60,7 +60,7 @@ where
     let ended = runtime.block_on(async {
         let mut node = Node::start(name, std::env::args(), &guard)?;
         let work = match setup(&mut node) {
-            // It was suspended while it set itself up.
+            // DDS stopped while it set itself up.
             Err(_) if node.is_deaf() => return Ok(Ended::Deaf),
             work => work?,
         };
@@ -76,7 +76,7 @@ where
         Ok::<_, E>(node.run(work, guard.asked()).await)
     });
     if let Ok(Ended::Deaf) = &ended {
-        tracing::error!("DDS has stopped, as it does when a suspended process goes on: starting anew");
+        tracing::error!("DDS has stopped: starting anew");
     }
     runtime.shutdown_timeout(COMPUTATION_TIME);
     match ended? {

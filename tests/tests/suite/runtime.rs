@@ -313,9 +313,26 @@ fn a_node_that_was_stopped_and_goes_on_is_heard_again() {
     node.signal("STOP");
     std::thread::sleep(Duration::from_millis(500));
     node.signal("CONT");
-    node.wait_for_log("starting anew", PATIENCE);
-    node.wait_for_log("publishes as /result_source", PATIENCE);
     hear();
+    let environment = std::fs::read_to_string(format!("/proc/{}/environ", node.id())).unwrap();
+    assert!(!environment.contains("GRIPSIGHT_STARTED_ANEW"), "it has forgotten what it knew");
+}
+
+/// Whatever DDS is doing at that moment.
+#[test]
+fn a_node_that_is_stopped_while_it_starts_starts() {
+    for after_ms in (4..60).step_by(4) {
+        let domain = Domain::new();
+        let node = Process::start(
+            &domain,
+            std::process::Command::new(gripsight_tests::process::program("stubborn_node")),
+        );
+        std::thread::sleep(Duration::from_millis(after_ms));
+        node.signal("STOP");
+        std::thread::sleep(Duration::from_millis(50));
+        node.signal("CONT");
+        node.wait_for_log("up as", PATIENCE);
+    }
 }
 
 #[test]
