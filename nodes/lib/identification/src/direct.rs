@@ -210,11 +210,6 @@ impl Direct {
         standard_error(self.covariance.as_ref(), parameter)
     }
 
-    /// Covariance of both axles' (k, C, D, E); `None` where nothing is known.
-    pub(crate) fn covariance_of_tires(&self) -> Option<DMatrix<f64>> {
-        self.covariance.as_ref().map(|c| c.view((0, 0), (8, 8)).into_owned())
-    }
-
     /// Covariance of an axle's (k, C, D, E); `None` where nothing is known.
     pub(crate) fn covariance_of_axle(&self, offset: usize) -> Option<DMatrix<f64>> {
         self.covariance.as_ref().map(|c| c.view((offset, offset), (4, 4)).into_owned())

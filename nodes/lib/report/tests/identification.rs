@@ -203,7 +203,7 @@ fn the_verdict_says_what_the_figures_rest_on() {
     );
 
     // 0.004 rad per m/s2, plus or minus a quarter.
-    assert!(page(&accepted).contains("2.25 (1.69 … 2.81) up to 2.3 m/s2: understeers"));
+    assert!(page(&accepted).contains("2.2 (1.7 … 2.8) up to 2.3 m/s2: understeers"));
 
     let mut within = outcome();
     within.status = Status::AcceptedWithin;
