@@ -95,6 +95,7 @@ class Observer:
                         if self.ahead.pop(stamp, None) is None:
                             self.sent[stamp] = now
                         else:
+                            # No later than its odometry, as far as this process can tell.
                             self.latencies.append(0.0)
                         if last is not None:
                             self.distance_m += float(np.hypot(here.x - last[0], here.y - last[1]))

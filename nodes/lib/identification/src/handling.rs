@@ -7,8 +7,8 @@
 //!
 //! In a steady turn the steering angle and the curve driven give the difference of both axles' slips, whatever v_y is. Its interval takes the errors of both
 //! curves for independent. By their joint covariance it is half as wide, and too narrow: what a single-track model does not have (compliance, roll steer)
-//! is not the same at both axles. On development drives of the reference car (seeds 5000 to 5015, with those effects) 16 of 39 true gradients lie within the joint
-//! interval, 38 within this one; of others' plants 23 of 23 within either. (Pacejka, Tire and Vehicle Dynamics, 3rd edition, 1.3.1; ISO 4138.)
+//! is not the same at both axles. Of the reference car's drives in `tests/results/identification/signals.md`, with those effects, 38 of 40 true gradients lie within
+//! it, and by the joint covariance 20; of others' plants (`plants.md`) all, and all but two. (Pacejka, Tire and Vehicle Dynamics, 3rd edition, 1.3.1; ISO 4138.)
 
 use gripsight_vehicle::{GRAVITY_MPS2, MagicFormula, PacejkaParameters};
 use nalgebra::DVector;
