@@ -13,6 +13,7 @@
 #[path = "../accuracy/cases.rs"]
 mod cases;
 mod lies;
+mod steady;
 #[allow(dead_code)]
 #[path = "../support/mod.rs"]
 mod support;
@@ -23,6 +24,7 @@ use anyhow::{Result, bail};
 use gripsight_identification::{
     Config, FrictionPrior, Outcome, PerAxle, ResidualKind, Usable, identify, understeer_rad,
 };
+use gripsight_reference_car::Recording;
 use gripsight_signals::StateSequence;
 use gripsight_vehicle::{GRAVITY_MPS2, MagicFormula, PacejkaParameters, VehicleParameters};
 use lies::{LOCALISATIONS, lies, localised};
@@ -46,11 +48,15 @@ fn over(set: &MagicFormula, truth: &MagicFormula, within_rad: f64, shown: f64) -
         .fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Understeer gradient of the true curves over the lateral accelerations that the one found is of, rad per m/s2.
-fn true_gradient(truth: &PerAxle<MagicFormula>, up_to_a_y_mps2: f64) -> f64 {
+/// Understeer gradient of the true curves over the lateral accelerations that the one found is of, rad per m/s2: what is known of plants that cannot be
+/// asked for a steady turn.
+fn of_curves(truth: &PerAxle<MagicFormula>, up_to_a_y_mps2: f64) -> f64 {
     let tires = PacejkaParameters { front: truth.front, rear: truth.rear };
     understeer_rad(&tires, up_to_a_y_mps2 / GRAVITY_MPS2) / up_to_a_y_mps2
 }
+
+/// The true understeer gradient up to a lateral acceleration, rad per m/s2.
+type Gradient<'a> = &'a dyn Fn(f64) -> f64;
 
 /// A row of one identification.
 fn row(
@@ -59,6 +65,7 @@ fn row(
     sequence: &StateSequence,
     vehicle: &VehicleParameters,
     truth: Option<&PerAxle<MagicFormula>>,
+    gradient: Gradient<'_>,
     prior: Option<FrictionPrior>,
 ) -> String {
     let outcome = match identify(sequence, vehicle, prior, None, &quick(), &mut |_| {}) {
@@ -96,7 +103,7 @@ fn row(
     };
     cells.extend(axle(true).iter().chain(&axle(false)).map(|v| format!("{v:.4}")));
     let found = o.handling.understeer_gradient_rad_per_mps2;
-    let truth = truth.map_or(f64::NAN, |t| true_gradient(t, o.handling.up_to_a_y_mps2));
+    let truth = gradient(o.handling.up_to_a_y_mps2);
     for value in [truth, found.value, found.low, found.high] {
         cells.push(format!("{:.4}", (value * GRAVITY_MPS2).to_degrees()));
     }
@@ -127,16 +134,28 @@ struct Drive {
     vehicle: VehicleParameters,
     truth: PerAxle<MagicFormula>,
     mu: f64,
+    case: cases::Case,
+    recording: Recording,
+}
+
+impl Drive {
+    /// The plant's own, at the speed of this drive's turns.
+    fn gradient(&self, a_y_mps2: f64) -> f64 {
+        let speed_mps = steady::speed_in_turns_mps(&self.recording, a_y_mps2);
+        speed_mps
+            .and_then(|v| steady::understeer_rad_per_mps2(&self.case, v, a_y_mps2))
+            .unwrap_or(f64::NAN)
+    }
 }
 
 fn drawn(seed: u64, duration_s: f64) -> Result<Drive> {
     let case = cases::draw(seed, duration_s)?;
     let mu = case.scenario.friction.nominal();
-    let (recording, sequence, vehicle) = reference::drive(case.scenario);
+    let (recording, sequence, vehicle) = reference::drive(case.scenario.clone());
     let truth = truth_of(&recording, &vehicle);
     let curve = |t: &Truth| floor(t).map(|(curve, _)| curve);
     let truth = PerAxle { front: curve(&truth.front)?, rear: curve(&truth.rear)? };
-    Ok(Drive { name: case.name, sequence, vehicle, truth, mu })
+    Ok(Drive { name: case.name.clone(), sequence, vehicle, truth, mu, case, recording })
 }
 
 fn main() -> Result<()> {
@@ -149,11 +168,14 @@ fn main() -> Result<()> {
         ("no_v_y", [from, to, duration_s]) => {
             for seed in from.parse::<u64>()?..to.parse()? {
                 let d = drawn(seed, duration_s.parse()?)?;
-                println!("{}", row(&d.name, "v_y measured", &d.sequence, &d.vehicle, Some(&d.truth), None));
+                let row = |what, sequence: &_| {
+                    row(&d.name, what, sequence, &d.vehicle, Some(&d.truth), &|a_y| d.gradient(a_y), None)
+                };
+                println!("{}", row("v_y measured", &d.sequence));
                 for (what, localisation) in LOCALISATIONS {
                     let mut sequence = localised(&d.sequence, localisation, seed ^ POSE_SEED);
                     sequence.v_y_mps.fill(0.0);
-                    println!("{}", row(&d.name, what, &sequence, &d.vehicle, Some(&d.truth), None));
+                    println!("{}", row(what, &sequence));
                 }
             }
         }
@@ -162,9 +184,14 @@ fn main() -> Result<()> {
                 let d = drawn(seed, duration_s.parse()?)?;
                 let prior = Some(FrictionPrior { mu: d.mu + 0.33, sigma: 0.1 });
                 let what = "friction prior 0.33 too high; beside it poses and IMU";
-                println!("{}", row(&d.name, what, &d.sequence, &d.vehicle, Some(&d.truth), prior));
+                // What lies is about forces: no steady turn is driven for it.
+                let row = |what: &str, sequence: &_, prior| {
+                    let gradient = |a_y| of_curves(&d.truth, a_y);
+                    row(&d.name, what, sequence, &d.vehicle, Some(&d.truth), &gradient, prior)
+                };
+                println!("{}", row(what, &d.sequence, prior));
                 for (what, sequence) in lies(&d.sequence, &d.vehicle, &d.truth, seed ^ POSE_SEED) {
-                    println!("{}", row(&d.name, &what, &sequence, &d.vehicle, Some(&d.truth), None));
+                    println!("{}", row(&what, &sequence, None));
                 }
             }
         }
@@ -172,10 +199,11 @@ fn main() -> Result<()> {
             for folder in folders.iter().map(Path::new) {
                 let (vehicle, sequence) = read(folder, f64::INFINITY)?;
                 let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                println!("{}", row(&name, "as recorded", &sequence, &vehicle, None, None));
+                let row = |what, sequence: &_| row(&name, what, sequence, &vehicle, None, &|_| f64::NAN, None);
+                println!("{}", row("as recorded", &sequence));
                 let mut without = sequence.clone();
                 without.v_y_mps.fill(0.0);
-                println!("{}", row(&name, "without v_y", &without, &vehicle, None, None));
+                println!("{}", row("without v_y", &without));
             }
         }
         ("foreign", folders) => {
@@ -183,8 +211,10 @@ fn main() -> Result<()> {
                 let run = read_with_truth(folder, f64::INFINITY)?;
                 let curve = |t: &Truth| floor(t).map(|(curve, _)| curve);
                 let truth = PerAxle { front: curve(&run.truth.front)?, rear: curve(&run.truth.rear)? };
-                let row =
-                    |what, sequence: &_| row(&run.name, what, sequence, &run.vehicle, Some(&truth), None);
+                let row = |what, sequence: &_| {
+                    let gradient = |a_y| of_curves(&truth, a_y);
+                    row(&run.name, what, sequence, &run.vehicle, Some(&truth), &gradient, None)
+                };
                 println!("{}", row("v_y measured", &run.sequence));
                 for (place, (what, localisation)) in LOCALISATIONS.into_iter().enumerate() {
                     let mut sequence = localised(&run.sequence, localisation, place as u64 ^ POSE_SEED);

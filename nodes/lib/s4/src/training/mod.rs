@@ -202,8 +202,13 @@ pub fn train(
         validation_losses: Vec::new(),
         stop_reason: StopReason::EpochLimit,
     };
+    // What the epoch before has looked ahead.
+    let mut ahead = None;
     for epoch in 0..config.epochs_max {
-        let training_loss = objective.loss_and_gradient(&weights, &mut gradient)?;
+        let training_loss = match ahead.take() {
+            Some(loss) => loss,
+            None => objective.loss_and_gradient(&weights, &mut gradient)?,
+        };
         if !clip(&mut gradient, config.gradient_norm_max) || !training_loss.is_finite() {
             report.stop_reason = StopReason::Diverged;
             break;
@@ -218,7 +223,14 @@ pub fn train(
 
         let mut validation_loss = training_loss;
         if let Some(held_out) = &mut held_out {
-            validation_loss = held_out.loss(&weights)?;
+            // The next epoch's gradient is of the same weights.
+            let more = epoch + 1 < config.epochs_max;
+            let (held_out_loss, next) = rayon::join(
+                || held_out.loss(&weights),
+                || more.then(|| objective.loss_and_gradient(&weights, &mut gradient)).transpose(),
+            );
+            validation_loss = held_out_loss?;
+            ahead = next?;
             report.validation_losses.push(validation_loss);
             if validation_loss < report.best_loss * (1.0 - config.improvement_min) {
                 report.best_loss = validation_loss;

@@ -14,16 +14,27 @@ use std::sync::Arc;
 
 /// Transforms and spectra for one set of sequences.
 pub(crate) struct Convolution {
-    channels: usize,
+    plan: Plan,
+    sequences: usize,
+    /// One a channel: none knows of another, so that they can be worked on side by side.
+    pub(crate) rows: Vec<Row>,
+}
+
+/// Both transforms of one size.
+#[derive(Clone)]
+pub(crate) struct Plan {
     size: usize,
     forward: Arc<dyn RealToComplex<f64>>,
     inverse: Arc<dyn ComplexToReal<f64>>,
-    /// Kernel spectra, `(H, bins)`.
-    kernels: Vec<Complex64>,
-    /// Input spectra, `(sequences, H, bins)`.
+}
+
+/// Spectra of one channel, and room to work in.
+pub(crate) struct Row {
+    plan: Plan,
+    kernel: Vec<Complex64>,
+    /// Input spectra, `(sequences, bins)`.
     inputs: Vec<Complex64>,
-    /// Gradient of the kernel spectra, `(H, bins)`.
-    kernel_gradients: Vec<Complex64>,
+    kernel_gradient: Vec<Complex64>,
     time: Vec<f64>,
     spectrum: Vec<Complex64>,
     scratch: Vec<Complex64>,
@@ -42,94 +53,83 @@ impl Convolution {
     pub(crate) fn new(channels: usize, length: usize, sequences: usize) -> Self {
         let size = padded_size(length);
         let mut planner = RealFftPlanner::new();
-        let (forward, inverse) = (planner.plan_fft_forward(size), planner.plan_fft_inverse(size));
-        let bins = size / 2 + 1;
-        let zero = Complex64::default();
-        Self {
-            channels,
-            size,
-            kernels: vec![zero; channels * bins],
-            inputs: vec![zero; sequences * channels * bins],
-            kernel_gradients: vec![zero; channels * bins],
-            time: vec![0.0; size],
-            spectrum: vec![zero; bins],
-            scratch: vec![zero; forward.get_scratch_len().max(inverse.get_scratch_len())],
-            forward,
-            inverse,
-        }
+        let plan =
+            Plan { size, forward: planner.plan_fft_forward(size), inverse: planner.plan_fft_inverse(size) };
+        let rows = (0..channels).map(|_| Row::new(&plan, sequences)).collect();
+        Self { plan, sequences, rows }
     }
 
     /// Whether the plan fits a set.
     pub(crate) fn fits(&self, length: usize, sequences: usize) -> bool {
-        self.size == padded_size(length) && self.inputs.len() == sequences * self.channels * self.bins()
+        self.plan.size == padded_size(length) && self.sequences == sequences
     }
+}
 
+impl Plan {
     fn bins(&self) -> usize {
         self.size / 2 + 1
     }
+}
 
-    /// Sets the kernel of a channel, written by `fill` into a row of `lags` values.
-    pub(crate) fn set_kernel(
-        &mut self,
-        channel: usize,
-        lags: usize,
-        fill: impl FnOnce(&mut [f64]),
-    ) -> Result<(), Error> {
+impl Row {
+    fn new(plan: &Plan, sequences: usize) -> Self {
+        let (bins, zero) = (plan.bins(), Complex64::default());
+        Self {
+            kernel: vec![zero; bins],
+            inputs: vec![zero; sequences * bins],
+            kernel_gradient: vec![zero; bins],
+            time: vec![0.0; plan.size],
+            spectrum: vec![zero; bins],
+            scratch: vec![zero; plan.forward.get_scratch_len().max(plan.inverse.get_scratch_len())],
+            plan: plan.clone(),
+        }
+    }
+
+    /// Sets the kernel, written by `fill` into `lags` values.
+    pub(crate) fn set_kernel(&mut self, lags: usize, fill: impl FnOnce(&mut [f64])) -> Result<(), Error> {
         fill(&mut self.time[..lags]);
         self.time[lags..].fill(0.0);
-        let bins = self.bins();
-        let spectrum = &mut self.kernels[channel * bins..][..bins];
-        transform(&*self.forward, &mut self.time, spectrum, &mut self.scratch)
+        transform(&*self.plan.forward, &mut self.time, &mut self.kernel, &mut self.scratch)
     }
 
-    /// `y = K * x` for every channel and sequence.
+    /// `y = K * x` for every sequence.
     pub(crate) fn apply(&mut self, pass: &Pass, x: &[f64], y: &mut [f64]) -> Result<(), Error> {
-        let (total, bins) = (pass.total(), self.bins());
+        let bins = self.plan.bins();
         for (sequence, (start, length)) in pass.segments().enumerate() {
-            for channel in 0..self.channels {
-                let at = channel * total + start;
-                let input = &mut self.inputs[(sequence * self.channels + channel) * bins..][..bins];
-                pad(&mut self.time, &x[at..][..length]);
-                transform(&*self.forward, &mut self.time, input, &mut self.scratch)?;
-                let kernel = &self.kernels[channel * bins..][..bins];
-                for ((product, kernel), input) in self.spectrum.iter_mut().zip(kernel).zip(&*input) {
-                    *product = kernel * input;
-                }
-                self.back_to_time()?;
-                y[at..][..length].copy_from_slice(&self.time[..length]);
+            let input = &mut self.inputs[sequence * bins..][..bins];
+            pad(&mut self.time, &x[start..][..length]);
+            transform(&*self.plan.forward, &mut self.time, input, &mut self.scratch)?;
+            for ((product, kernel), input) in self.spectrum.iter_mut().zip(&self.kernel).zip(&*input) {
+                *product = kernel * input;
             }
+            self.back_to_time()?;
+            y[start..][..length].copy_from_slice(&self.time[..length]);
         }
         Ok(())
     }
 
-    /// Gradient by the input into `dx`; that by the kernels is kept for [`Self::kernel_gradient`].
+    /// Gradient by the input into `dx`; that by the kernel is kept for [`Self::kernel_gradient`].
     pub(crate) fn backward(&mut self, pass: &Pass, dy: &[f64], dx: &mut [f64]) -> Result<(), Error> {
-        let (total, bins) = (pass.total(), self.bins());
-        self.kernel_gradients.fill(Complex64::default());
+        let bins = self.plan.bins();
+        self.kernel_gradient.fill(Complex64::default());
         for (sequence, (start, length)) in pass.segments().enumerate() {
-            for channel in 0..self.channels {
-                let at = channel * total + start;
-                pad(&mut self.time, &dy[at..][..length]);
-                transform(&*self.forward, &mut self.time, &mut self.spectrum, &mut self.scratch)?;
-                let input = &self.inputs[(sequence * self.channels + channel) * bins..][..bins];
-                let kernel = &self.kernels[channel * bins..][..bins];
-                let gradient = &mut self.kernel_gradients[channel * bins..][..bins];
-                let factors = kernel.iter().zip(input).zip(gradient);
-                for (value, ((kernel, input), gradient)) in self.spectrum.iter_mut().zip(factors) {
-                    *gradient += input.conj() * *value;
-                    *value *= kernel.conj();
-                }
-                self.back_to_time()?;
-                dx[at..][..length].copy_from_slice(&self.time[..length]);
+            pad(&mut self.time, &dy[start..][..length]);
+            transform(&*self.plan.forward, &mut self.time, &mut self.spectrum, &mut self.scratch)?;
+            let input = &self.inputs[sequence * bins..][..bins];
+            let factors = self.kernel.iter().zip(input).zip(&mut self.kernel_gradient);
+            for (value, ((kernel, input), gradient)) in self.spectrum.iter_mut().zip(factors) {
+                *gradient += input.conj() * *value;
+                *value *= kernel.conj();
             }
+            self.back_to_time()?;
+            dx[start..][..length].copy_from_slice(&self.time[..length]);
         }
         Ok(())
     }
 
-    /// Gradient of the loss by the first `lags` kernel values of a channel.
-    pub(crate) fn kernel_gradient(&mut self, channel: usize, lags: usize) -> Result<&[f64], Error> {
-        let bins = self.bins();
-        self.spectrum.copy_from_slice(&self.kernel_gradients[channel * bins..][..bins]);
+    /// Gradient of the loss by the first `lags` kernel values.
+    pub(crate) fn kernel_gradient(&mut self, lags: usize) -> Result<&[f64], Error> {
+        self.spectrum.copy_from_slice(&self.kernel_gradient);
         self.back_to_time()?;
         Ok(&self.time[..lags])
     }
@@ -140,10 +140,12 @@ impl Convolution {
         let last = self.spectrum.len() - 1;
         self.spectrum[0].im = 0.0;
         self.spectrum[last].im = 0.0;
-        self.inverse
+        let size = self.plan.size;
+        self.plan
+            .inverse
             .process_with_scratch(&mut self.spectrum, &mut self.time, &mut self.scratch)
-            .map_err(|error| Error::Fft { size: self.size, reason: error.to_string() })?;
-        let scale = 1.0 / self.size as f64;
+            .map_err(|error| Error::Fft { size, reason: error.to_string() })?;
+        let scale = 1.0 / size as f64;
         self.time.iter_mut().for_each(|value| *value *= scale);
         Ok(())
     }

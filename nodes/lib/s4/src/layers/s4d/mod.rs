@@ -31,6 +31,7 @@ use num_complex::Complex64;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Views of one layer's weights; shapes in the module's table.
@@ -124,17 +125,16 @@ impl Layer for S4d {
             _ => Convolution::new(self.channels, lags, sequences),
         };
         let convolution = self.convolution.insert(convolution);
-        let rows =
-            self.discrete.a_bar.chunks_exact(self.pairs).zip(self.discrete.c_bar.chunks_exact(self.pairs));
-        for (channel, (a_bar, c_bar)) in rows.enumerate() {
-            convolution.set_kernel(channel, lags, |row| kernel::fill(row, a_bar, c_bar))?;
-        }
-        convolution.apply(pass, x, y)?;
-        let total = pass.total();
-        for ((y, x), &d) in y.chunks_exact_mut(total).zip(x.chunks_exact(total)).zip(parameters.d) {
-            add_scaled(y, d, x);
-        }
-        Ok(())
+        let (pairs, total, discrete) = (self.pairs, pass.total(), &self.discrete);
+        let rows = convolution.rows.par_iter_mut().zip(y.par_chunks_exact_mut(total));
+        rows.zip(x.par_chunks_exact(total)).enumerate().try_for_each(|(channel, ((row, y), x))| {
+            let states = channel * pairs..(channel + 1) * pairs;
+            let (a_bar, c_bar) = (&discrete.a_bar[states.clone()], &discrete.c_bar[states]);
+            row.set_kernel(lags, |kernel| kernel::fill(kernel, a_bar, c_bar))?;
+            row.apply(pass, x, y)?;
+            add_scaled(y, parameters.d[channel], x);
+            Ok(())
+        })
     }
 
     fn backward(&mut self, pass: &Pass, signals: Backward) -> Result<(), Error> {
@@ -145,23 +145,26 @@ impl Layer for S4d {
         let Some(convolution) = &mut self.convolution else {
             return Err(Error::Empty { what: "forward pass before backward" });
         };
-        convolution.backward(pass, dy, dx)?;
         let (states, direct) = gradient.split_at_mut(weights.len() - self.channels);
-        let rows = dy.chunks_exact(total).zip(x.chunks_exact(total)).zip(dx.chunks_exact_mut(total));
-        for ((((dy, x), dx), by_d), &d) in rows.zip(direct).zip(parameters.d) {
-            add_scaled(dx, d, dy);
-            *by_d = dot(dy, x);
-        }
-        let mut discrete = DiscreteGradient { exponent: Vec::new(), c_bar: Vec::new() };
-        for channel in 0..self.channels {
-            let by_kernel = convolution.kernel_gradient(channel, lags)?;
-            for index in channel * self.pairs..(channel + 1) * self.pairs {
-                let (by_c_bar, by_exponent) =
-                    kernel::backward(by_kernel, self.discrete.a_bar[index], self.discrete.c_bar[index]);
-                discrete.c_bar.push(by_c_bar);
-                discrete.exponent.push(by_exponent);
-            }
-        }
+        let (pairs, discretization) = (self.pairs, &self.discrete);
+        let rows = convolution.rows.par_iter_mut().zip(dy.par_chunks_exact(total));
+        let rows = rows.zip(x.par_chunks_exact(total)).zip(dx.par_chunks_exact_mut(total)).zip(direct);
+        let by_state: Vec<Vec<(Complex64, Complex64)>> = rows
+            .enumerate()
+            .map(|(channel, ((((row, dy), x), dx), by_d))| {
+                row.backward(pass, dy, dx)?;
+                add_scaled(dx, parameters.d[channel], dy);
+                *by_d = dot(dy, x);
+                let by_kernel = row.kernel_gradient(lags)?;
+                let states = channel * pairs..(channel + 1) * pairs;
+                let gradients = states.map(|index| {
+                    kernel::backward(by_kernel, discretization.a_bar[index], discretization.c_bar[index])
+                });
+                Ok(gradients.collect())
+            })
+            .collect::<Result<_, Error>>()?;
+        let (c_bar, exponent) = by_state.into_iter().flatten().unzip();
+        let discrete = DiscreteGradient { exponent, c_bar };
         discretization::backward(&parameters, &discrete, states);
         Ok(())
     }
