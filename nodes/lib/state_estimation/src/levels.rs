@@ -51,6 +51,11 @@ pub struct Levels {
 /// Rounding and unmodelled small motion: no sensor is believed further.
 const LEAST: [f64; 6] = [2e-3, 1e-3, 5e-3, 2e-3, 0.02, 0.02];
 
+/// A lateral acceleration that may change no faster than it was seen to over a tenth of a second is followed late, and what it is late by reads as an arm of
+/// the inertial unit and a delay of the poses. With 4 m2/s5 the delay came out 3 ms too short, more than twice its standard deviation, and with 40 to 4000 by
+/// 0.5 ms, half of it (example `signals delays`, full-size cars of others' plants, poses to 1 degree).
+const LEAST_CHANGE_A_Y: f64 = 40.0;
+
 impl Levels {
     /// Looks at a sequence and its poses, whose delay is taken off.
     #[must_use]
@@ -88,7 +93,11 @@ impl Levels {
             v_y_spread_mps: (0.3 * typical).max(0.1),
             late_s: 0.03,
             arm_m: 0.3 * (typical / 5.0).clamp(0.5, 5.0),
-            change: [change_a_x.clamp(1.0, 1e4), change_a_y.clamp(4.0, 1e4), change_alpha.clamp(4.0, 1e5)],
+            change: [
+                change_a_x.clamp(1.0, 1e4),
+                change_a_y.clamp(LEAST_CHANGE_A_Y, 1e4),
+                change_alpha.clamp(4.0, 1e5),
+            ],
         };
         if poses.time_s.is_empty() { levels } else { with_coloured(sequence, poses, levels) }
     }

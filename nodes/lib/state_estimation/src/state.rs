@@ -66,6 +66,8 @@ pub(crate) fn rate(s: &Vector) -> Vector {
     d[V_X] = s[A_X] + s[V_Y] * s[R];
     d[V_Y] = s[A_Y] - s[V_X] * s[R];
     d[R] = s[ALPHA];
+    // a_y = dv_y/dt + v_x r: what turns the car ever harder is no surprise.
+    d[A_Y] = s[V_X] * s[ALPHA] + s[A_X] * s[R];
     d
 }
 
@@ -87,6 +89,10 @@ pub(crate) fn jacobian(s: &Vector) -> Matrix {
     a[(V_Y, V_X)] = -s[R];
     a[(V_Y, R)] = -s[V_X];
     a[(R, ALPHA)] = 1.0;
+    a[(A_Y, V_X)] = s[ALPHA];
+    a[(A_Y, ALPHA)] = s[V_X];
+    a[(A_Y, A_X)] = s[R];
+    a[(A_Y, R)] = s[A_X];
     a
 }
 

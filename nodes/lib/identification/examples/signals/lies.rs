@@ -13,7 +13,7 @@ pub(crate) struct Localisation {
     rate_hz: f64,
     position_m: f64,
     heading_rad: f64,
-    delay_s: f64,
+    pub(crate) delay_s: f64,
     /// Every so many seconds it jumps and stays; infinite: never.
     jumps_every_s: f64,
     /// Whether the inertial unit is recorded.

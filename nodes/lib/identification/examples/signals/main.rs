@@ -5,6 +5,7 @@
 //! signals lies FROM TO DURATION_S        signals scaled, turned, in other units, or made by an observer, with poses and an inertial unit and without
 //! signals bags FOLDER...                 bag folders: v_y as recorded, and estimated from the poses recorded
 //! signals foreign FOLDER...              the bag folders of other plants with their true forces: v_y as recorded, and estimated as with no_v_y
+//! signals delays FOLDER...               the same bags: the delay of the poses that is found, and its standard deviation
 //! signals honest FROM TO DURATION_S      what the cross checks give on honest drives: the tolerances rest on it
 //! ```
 //!
@@ -26,6 +27,7 @@ use gripsight_identification::{
 };
 use gripsight_reference_car::Recording;
 use gripsight_signals::StateSequence;
+use gripsight_state_estimation::smooth;
 use gripsight_vehicle::{GRAVITY_MPS2, MagicFormula, PacejkaParameters, VehicleParameters};
 use lies::{LOCALISATIONS, lies, localised};
 use support::{Truth, floor, read, read_with_truth, reference, truth_of};
@@ -160,9 +162,11 @@ fn drawn(seed: u64, duration_s: f64) -> Result<Drive> {
 
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let Some((mode, rest)) = arguments.split_first() else { bail!("no_v_y, lies, bags, foreign or honest?") };
-    if mode != "honest" {
-        println!("{HEADER}");
+    let Some((mode, rest)) = arguments.split_first() else { bail!("no_v_y, lies, bags, foreign, delays or honest?") };
+    match mode.as_str() {
+        "honest" => {}
+        "delays" => println!("run,what,delay_s,found_s,sigma_s"),
+        _ => println!("{HEADER}"),
     }
     match (mode.as_str(), rest) {
         ("no_v_y", [from, to, duration_s]) => {
@@ -220,6 +224,17 @@ fn main() -> Result<()> {
                     let mut sequence = localised(&run.sequence, localisation, place as u64 ^ POSE_SEED);
                     sequence.v_y_mps.fill(0.0);
                     println!("{}", row(what, &sequence));
+                }
+            }
+        }
+        ("delays", folders) => {
+            for (seed, folder) in (0..).zip(folders.iter().map(Path::new)) {
+                let run = read_with_truth(folder, f64::INFINITY)?;
+                for (what, localisation) in LOCALISATIONS {
+                    let mut sequence = localised(&run.sequence, localisation, seed ^ POSE_SEED);
+                    sequence.v_y_mps.fill(0.0);
+                    let (found_s, sigma_s) = smooth(&sequence)?.pose_delay_s.unwrap_or((f64::NAN, f64::NAN));
+                    println!("{},{what},{},{found_s:.5},{sigma_s:.5}", run.name, localisation.delay_s);
                 }
             }
         }
