@@ -4,13 +4,9 @@
 //! side is handed on, with no force promised beyond what was shown of it; one that is known worse is not.
 
 use crate::conclude::unstable_at_mps;
-use crate::envelope::Envelope;
+use crate::envelope::{Envelope, KNOWN_WITHIN};
 use crate::tires::MOST_FORCE;
-use crate::{Identification, Outcome, PeakFriction, Status, ValidWithin};
-
-/// A force, stiffness included, over the lower end of its interval at any slip driven: a controller with the classical gain margin of 6 dB bears a
-/// plant whose gain is off by this factor to either side.
-const KNOWN_WITHIN: f64 = 2.0;
+use crate::{Identification, Outcome, PeakFriction, Range, Status, ValidWithin};
 
 /// Scatter of v_y that is said, as a share of the slip at which the rear tires' linear force would meet their peak.
 const V_Y_SHARE: f64 = 0.25;
@@ -142,9 +138,15 @@ fn stability(run: &Identification, envelope: &Envelope, outcome: &Outcome, verdi
 /// Curves that are not known well enough to steer by.
 fn forces(envelope: &Envelope, outcome: &Outcome, verdict: &mut Verdict) {
     let stiffness = &outcome.cornering_stiffness_n_per_rad;
-    for (axle, k, factor) in
-        [("front", stiffness.front, envelope.factor.front), ("rear", stiffness.rear, envelope.factor.rear)]
-    {
+    let (driven, valid) = (&outcome.slip_range_rad, &envelope.valid_within.slip_rad);
+    let short = |driven: &Range, valid_rad: f64| {
+        let driven_rad = driven.high.max(-driven.low);
+        (valid_rad < (1.0 - 1e-6) * driven_rad).then_some([valid_rad, driven_rad].map(f64::to_degrees))
+    };
+    for (axle, k, factor, short) in [
+        ("front", stiffness.front, envelope.factor.front, short(&driven.front, valid.front)),
+        ("rear", stiffness.rear, envelope.factor.rear, short(&driven.rear, valid.rear)),
+    ] {
         let stiff = k.value / k.low;
         if stiff.is_nan() || stiff > KNOWN_WITHIN {
             verdict.against.push(format!(
@@ -153,6 +155,10 @@ fn forces(envelope: &Envelope, outcome: &Outcome, verdict: &mut Verdict) {
         } else if factor.is_nan() || factor > KNOWN_WITHIN {
             verdict.unknown.push(format!(
                 "{axle} force over the slips driven is known to a factor of {factor:.1} only (90 % interval; {KNOWN_WITHIN:.1} can be steered by)"
+            ));
+        } else if let Some([known_deg, driven_deg]) = short {
+            verdict.remarks.push(format!(
+                "{axle} force is known up to {known_deg:.1} degrees of slip, and not at the {driven_deg:.1} degrees that were touched: the set ends there"
             ));
         } else {
             continue;

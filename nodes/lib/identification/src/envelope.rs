@@ -9,7 +9,8 @@
 //!
 //! In a steady turn both axles carry the same F_y/F_z = a_y/g: one cap for both, so that it invents no understeer and no oversteer. Where both
 //! peaks are known each axle keeps its own, and curves known to the tolerance are handed on as they were found. The worse a curve is known, the lower
-//! the promise.
+//! the promise. Slips that were touched only, in a jerk at the start or a moment's slide, leave the force there unknown: the set then ends where the force
+//! is known to [`KNOWN_WITHIN`], if that holds half of the lateral acceleration driven.
 
 mod band;
 
@@ -24,6 +25,9 @@ use crate::{Estimate, Identification, IdentificationError, PerAxle};
 
 pub(crate) use band::{Band, half_width};
 
+/// A force, stiffness included, over the lower end of its interval at any slip of a set: a controller with the classical gain margin of 6 dB bears a
+/// plant whose gain is off by this factor to either side.
+pub(crate) const KNOWN_WITHIN: f64 = 2.0;
 /// Where both peaks are known a promise may lie above the truth by this share of the largest force, in 95 of 100 cases: half of what is counted as a
 /// promise too high.
 const TOLERANCE: f64 = 0.05;
@@ -77,10 +81,17 @@ impl Envelope {
         found: &PacejkaParameters,
         stiffness: &PerAxle<Estimate>,
     ) -> Result<Self, IdentificationError> {
-        let bands = PerAxle {
+        let reached = run.direct.peak.front.reached && run.direct.peak.rear.reached;
+        let held = held_lateral_g(&run.data);
+        let mut bands = PerAxle {
             front: Band::new(run, &found.front, &run.direct.tires.front, 0),
             rear: Band::new(run, &found.rear, &run.direct.tires.rear, 4),
         };
+        if !reached
+            && let Some(known) = known(&bands).filter(|known| KNOWN_WITHIN * promise(known) >= held)
+        {
+            bands = known;
+        }
         let vehicle = &run.vehicle;
         let loads_n = PerAxle { front: vehicle.static_load_front_n(), rear: vehicle.static_load_rear_n() };
         let interval = |k: &Estimate, load_n: f64| (k.low / load_n, k.high / load_n);
@@ -94,11 +105,10 @@ impl Envelope {
             band: &bands.rear,
             stiffness: interval(&stiffness.rear, loads_n.rear),
         };
-        let reached = run.direct.peak.front.reached && run.direct.peak.rear.reached;
         let tolerance = if reached { TOLERANCE } else { 0.0 };
         let mut caps = [front.band.shown(tolerance), rear.band.shown(tolerance)].map(|shown| highest(&shown));
         if !reached {
-            caps = [caps[0].min(caps[1]).min(held_lateral_g(&run.data)); 2];
+            caps = [promise(&bands).min(held); 2];
         }
         let tires = PacejkaParameters {
             front: front.within(caps[0], tolerance)?,
@@ -158,6 +168,16 @@ impl Axle<'_> {
         }
         Ok(best.map_or(*self.found, |b| axle(&b.x)))
     }
+}
+
+/// Both curves up to the slips from which they are known badly; `None` where one is nowhere known well.
+fn known(bands: &PerAxle<Band>) -> Option<PerAxle<Band>> {
+    Some(PerAxle { front: bands.front.known(KNOWN_WITHIN)?, rear: bands.rear.known(KNOWN_WITHIN)? })
+}
+
+/// The largest force over the load that both axles have certainly shown.
+fn promise(bands: &PerAxle<Band>) -> f64 {
+    highest(&bands.front.shown(0.0)).min(highest(&bands.rear.shown(0.0)))
 }
 
 /// A front axle as much softer, within its interval, as it takes to run straight at a speed: the end of the interval where nothing does.

@@ -135,14 +135,18 @@ impl Loop {
             }
         }
         let Some(now) = self.sim.now() else { return Ok(None) };
+        self.referee.promised(now, self.learner.as_ref().and_then(|learner| learner.promised));
         if let Some(reason) = self.referee.look(now, &self.driver) {
             return Ok(Some(reason));
         }
-        if self.driver.halves() > self.halves {
+        let half = self.driver.halves() > self.halves;
+        if let Some(learner) = &mut self.learner
+            && (learner.is_due() || half)
+        {
+            learner.identify(&mut self.driver, self.verbose)?;
+        }
+        if half {
             self.halves = self.driver.halves();
-            if let Some(learner) = &mut self.learner {
-                learner.identify(&mut self.driver, self.verbose)?;
-            }
             if self.verbose {
                 eprintln!(
                     "  {:.1} s, half lap {}: planned {:.3} {}{}",

@@ -13,6 +13,8 @@ use gripsight_vehicle::{GRAVITY_MPS2, PacejkaParameters, VehicleParameters};
 
 /// Longest telemetry to identify from, and shortest.
 const WINDOW_S: (f64, f64) = (30.0, 8.0);
+/// A window that grows is looked at again after so long, as `telemetry` gives it out (`first_s` of `params/suite.yaml`, and every half of that).
+const GROWTH_S: f64 = 4.0;
 
 /// What the identifier does, in process.
 pub(crate) struct Learner {
@@ -23,6 +25,10 @@ pub(crate) struct Learner {
     in_use: Option<AcceptedSet>,
     watch: Option<GripWatch>,
     config: Config,
+    /// Length from which a window that grows is looked at next.
+    due_s: f64,
+    /// Lateral acceleration over g that the set in use promises.
+    pub(crate) promised: Option<f64>,
 }
 
 impl Learner {
@@ -35,6 +41,8 @@ impl Learner {
             in_use: None,
             watch: None,
             config: Config { residual: ResidualKind::None, ..Config::default() },
+            due_s: WINDOW_S.1,
+            promised: None,
         }
     }
 
@@ -61,6 +69,15 @@ impl Learner {
     fn span_s(&self) -> f64 {
         let ends = self.recent.front().zip(self.recent.back());
         ends.map_or(0.0, |(a, b)| (b.odometry.stamp_ns - a.odometry.stamp_ns) as f64 * 1e-9)
+    }
+
+    /// Whether a window that grows is due to be looked at.
+    pub(crate) fn is_due(&mut self) -> bool {
+        let due = self.due_s < WINDOW_S.0 && self.span_s() >= self.due_s;
+        if due {
+            self.due_s += GROWTH_S;
+        }
+        due
     }
 
     pub(crate) fn identify(&mut self, driver: &mut Driver, verbose: bool) -> Result<()> {
@@ -99,7 +116,7 @@ impl Learner {
         if outcome.replaces(self.in_use.as_ref()) {
             let trust =
                 if outcome.status == Status::Accepted { Trust::Accepted } else { Trust::AcceptedWithin };
-            take(driver, &outcome, &outcome.phi_p, trust, verbose);
+            self.promised = take(driver, &outcome, &outcome.phi_p, trust, verbose);
             self.in_use = outcome.accepted_set();
             self.watch = self.in_use.as_ref().map(|set| GripWatch::new(&self.vehicle, set)).transpose()?;
         }
@@ -133,8 +150,14 @@ fn told(found: &gripsight_identification::Longitudinal) -> Longitudinal {
     }
 }
 
-/// Hands a set to the driver, as a message would.
-fn take(driver: &mut Driver, outcome: &Outcome, tires: &PacejkaParameters, trust: Trust, verbose: bool) {
+/// Hands a set to the driver, as a message would; the grip that it promises, where it was taken.
+fn take(
+    driver: &mut Driver,
+    outcome: &Outcome,
+    tires: &PacejkaParameters,
+    trust: Trust,
+    verbose: bool,
+) -> Option<f64> {
     let slip = &outcome.valid_within.slip_rad;
     let signals = &outcome.signals;
     let (front, rear) = (&outcome.peak_friction.front, &outcome.peak_friction.rear);
@@ -156,9 +179,13 @@ fn take(driver: &mut Driver, outcome: &Outcome, tires: &PacejkaParameters, trust
             ..Actuator::default()
         },
     };
-    if let Err(error) = driver.take(set)
-        && verbose
-    {
-        eprintln!("  not taken: {error}; {} m/s2", GRAVITY_MPS2 * set.grip());
+    match driver.take(set) {
+        Ok(()) => Some(set.grip()),
+        Err(error) => {
+            if verbose {
+                eprintln!("  not taken: {error}; {} m/s2", GRAVITY_MPS2 * set.grip());
+            }
+            None
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use gripsight_driving::{Driver, Limits, SpeedProfile, Track, Trust};
 use gripsight_reference_car::TruthSample;
+use gripsight_vehicle::GRAVITY_MPS2;
 
 /// Share of the grip from which the fastest drive on the true tires is in a corner.
 const CORNER: f64 = 0.9;
@@ -21,6 +22,8 @@ pub(crate) struct Lap {
     pub(crate) planned: f64,
     /// What the driver drove on at its end.
     pub(crate) trust: Option<Trust>,
+    /// Lateral acceleration over the true grip that the set in use at its end promised.
+    pub(crate) promised: Option<f64>,
 }
 
 /// Watches the truth.
@@ -36,6 +39,10 @@ pub(crate) struct Referee {
     station_m: f64,
     outside: bool,
     slow: u32,
+    corner_s: Option<f64>,
+    promised: Option<f64>,
+    /// From the first corner to the first set.
+    pub(crate) first_set_s: Option<f64>,
 }
 
 impl Referee {
@@ -52,6 +59,9 @@ impl Referee {
             station_m: 0.0,
             outside: false,
             slow: 0,
+            corner_s: None,
+            promised: None,
+            first_set_s: None,
         }
     }
 
@@ -76,6 +86,14 @@ impl Referee {
         self.laps.len() as f64 * self.track.length_m() + self.station_m
     }
 
+    /// The set in use promises this lateral acceleration over g.
+    pub(crate) fn promised(&mut self, now: &TruthSample, grip: Option<f64>) {
+        self.promised = grip.map(|grip| grip * GRAVITY_MPS2 / self.grip_mps2);
+        if let Some(corner_s) = self.corner_s.filter(|_| grip.is_some()) {
+            self.first_set_s.get_or_insert(now.motion.time_s - corner_s);
+        }
+    }
+
     /// The reason for which the run cannot go on.
     pub(crate) fn look(&mut self, now: &TruthSample, driver: &Driver) -> Option<&'static str> {
         let (m, offset_m) = (&now.motion, now.offset_m.abs());
@@ -86,6 +104,7 @@ impl Referee {
                 used: self.lap.used / self.looks.1.max(1.0),
                 planned: driver.grip(),
                 trust: Some(driver.trust()),
+                promised: self.promised,
                 ..self.lap
             };
             self.laps.push(lap);
@@ -100,6 +119,7 @@ impl Referee {
         if fastest * fastest * point.curvature_1pm.abs() > CORNER * self.grip_mps2 {
             self.lap.used += m.specific_x_mps2.hypot(m.specific_y_mps2) / self.grip_mps2;
             self.looks.1 += 1.0;
+            self.corner_s.get_or_insert(m.time_s);
         }
         let outside = offset_m > self.half_width_m;
         self.lap.exits += u32::from(outside && !self.outside);

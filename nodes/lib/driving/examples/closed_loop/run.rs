@@ -80,6 +80,8 @@ pub(crate) struct Case {
 #[derive(Debug, Clone)]
 pub(crate) struct Run {
     pub(crate) laps: Vec<Lap>,
+    /// From the first corner to the first set.
+    pub(crate) first_set_s: Option<f64>,
     /// Why it ended early.
     pub(crate) wreck: Option<&'static str>,
 }
@@ -102,5 +104,5 @@ pub(crate) fn drive(case: &Case, variant: Variant, verbose: bool) -> Result<Run>
             wreck = wreck.or(Some("too slow"));
         }
     }
-    Ok(Run { laps: run.referee.laps, wreck })
+    Ok(Run { first_set_s: run.referee.first_set_s, laps: run.referee.laps, wreck })
 }

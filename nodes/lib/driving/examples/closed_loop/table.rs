@@ -29,6 +29,11 @@ pub(crate) struct Row {
     set: String,
     wreck: String,
     run_seconds: f64,
+    /// From the first corner to the first set, and what the one in use promises over the true grip.
+    #[serde(default)]
+    first_set_s: Option<f64>,
+    #[serde(default)]
+    promised: Option<f64>,
 }
 
 impl Row {
@@ -60,6 +65,8 @@ pub(crate) fn rows(case: &Case, variant: Variant, run: &Run, seconds: f64) -> Ve
         set: lap.trust.map_or(String::new(), |t| format!("{t:?}")),
         wreck: if number == run.laps.len() { run.wreck.unwrap_or("").to_owned() } else { String::new() },
         run_seconds: parts(seconds, 1e2),
+        first_set_s: run.first_set_s.map(|s| parts(s, 1e2)),
+        promised: lap.promised.map(|grip| parts(grip, 1e4)),
     };
     if run.laps.is_empty() {
         return vec![row(0, &Lap { time_s: f64::NAN, ..Lap::default() })];
@@ -156,6 +163,40 @@ pub(crate) fn summary(rows: &[Row]) -> String {
             );
         }
         text.push('\n');
+        text.push_str(&growth(rows, car));
     }
+    text
+}
+
+/// Time until a first safe set is asked to be there, s, and share of the grip that the set of the third lap is asked to promise.
+const SOON_S: f64 = 10.0;
+const GROWN: (usize, f64) = (3, 0.95);
+
+/// How soon there was a set, and how far it grew.
+fn growth(rows: &[Row], car: &str) -> String {
+    let mut text = String::new();
+    for variant in Variant::ALL {
+        let driven = runs(rows, car, variant);
+        let first: Vec<f64> = driven.iter().filter_map(|d| d.0[0].first_set_s).collect();
+        if first.is_empty() {
+            continue;
+        }
+        let soon = first.iter().filter(|&&s| s <= SOON_S).count();
+        let grown: Vec<f64> =
+            driven.iter().filter_map(|d| d.lap(GROWN.0 - 1)).map(|r| r.promised.unwrap_or(0.0)).collect();
+        let enough = grown.iter().filter(|&&share| share >= GROWN.1).count();
+        let _ = writeln!(
+            text,
+            "{}: a set {SOON_S} s after the first corner in {soon} of {} runs, {:.1} s in the median; at the end of lap {} it promises {:.0} % of the true grip in the median, {:.0} % or more in {enough} of {}.",
+            variant.name(),
+            driven.len(),
+            median(first),
+            GROWN.0,
+            100.0 * median(grown.clone()),
+            100.0 * GROWN.1,
+            grown.len(),
+        );
+    }
+    text.push('\n');
     text
 }

@@ -39,11 +39,26 @@ impl Band {
 
     /// Largest force over the lower end of its interval; infinite where that is not positive.
     pub(crate) fn factor(&self) -> f64 {
-        let factors = self.force.iter().zip(&self.half).map(|(force, half)| {
+        self.factors().fold(1.0, f64::max)
+    }
+
+    /// Force over the lower end of its interval at every slip; infinite where that is not positive.
+    fn factors(&self) -> impl Iterator<Item = f64> {
+        self.force.iter().zip(&self.half).map(|(force, half)| {
             let low = force - half;
             if low > 0.0 && low.is_finite() { force / low } else { f64::INFINITY }
-        });
-        factors.fold(1.0, f64::max)
+        })
+    }
+
+    /// Up to the slip from which the force is known worse than to a factor; `None` where it is nowhere known better.
+    pub(crate) fn known(&self, within: f64) -> Option<Self> {
+        let points = self.factors().take_while(|&factor| factor <= within).count();
+        let part = |values: &[f64]| values[..points].to_vec();
+        (points > 0).then(|| Self {
+            slip_rad: part(&self.slip_rad),
+            force: part(&self.force),
+            half: part(&self.half),
+        })
     }
 
     /// The force that was shown: what lies below it by more than a share of the largest force is not certain.
