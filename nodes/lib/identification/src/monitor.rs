@@ -3,8 +3,11 @@
 //! On the last seconds of each window of telemetry the peak factors D of both axles are fitted anew, everything else held at the accepted set. A change that is
 //! both larger than its uncertainty and worth acting on is a notice; small corners tell nothing and give none. Where the change lies is where the
 //! windows before fit best with the old D and those after it with the new: a run that is told of a change leaves out what lies before it.
+//!
+//! A set whose peak was not reached says nothing of slips beyond those that it is valid within: a car that is driven harder than before shows what its tires
+//! do there, and that is no change.
 
-use gripsight_model::Window;
+use gripsight_model::{Rollout, Window};
 use gripsight_signals::{DataHealth, StateSequence};
 use gripsight_vehicle::VehicleParameters;
 use serde::Serialize;
@@ -105,6 +108,18 @@ impl Monitor {
         self.read(&Data::new(&usable, &self.vehicle, &DataHealth::of(sequence)?, WINDOWS)?, sequence)
     }
 
+    /// Whether the set says what the car does in a window: all of them where both peaks were reached, else those within its slips by its own account.
+    fn speaks_of(&self, model: &TireRollout<'_>, p: &[f64], window: &Window) -> bool {
+        let (reached, valid) = (self.set.peak_reached, self.set.valid_within.slip_rad);
+        let mut within = true;
+        model.trajectory(p, model.start_guess(window), window, |visit| {
+            let (front, rear) = visit.slip_rad;
+            within &= reached.front || front.abs() <= valid.front;
+            within &= reached.rear || rear.abs() <= valid.rear;
+        });
+        within
+    }
+
     /// The same with the telemetry made ready.
     pub(crate) fn read(&self, data: &Data, sequence: &StateSequence) -> Result<Reading, IdentificationError> {
         let model = TireRollout::new(&self.vehicle, data);
@@ -115,7 +130,13 @@ impl Monitor {
         };
         let late = |w: &Window| begin_s(w) >= from_s;
         let all: Vec<Window> = data.windows.iter().map(|(w, _)| *w).collect();
-        let windows: Vec<Window> = all.iter().copied().filter(late).collect();
+        let p = vector_of(&self.set.phi_p, &self.set.corrections, &self.set.nuisance);
+        let mut windows: Vec<Window> = all.iter().copied().filter(late).collect();
+        let within: Vec<Window> = windows.iter().copied().filter(|w| self.speaks_of(&model, &p, w)).collect();
+        let silent = within.len() < WINDOWS;
+        if !silent {
+            windows = within;
+        }
         if windows.len() < WINDOWS {
             let length_s = windows.first().map_or(0.0, |w| w.len as f64 * data.dt_s);
             return Err(IdentificationError::TooLittle {
@@ -125,7 +146,6 @@ impl Monitor {
                 drive: "drive on",
             });
         }
-        let p = vector_of(&self.set.phi_p, &self.set.corrections, &self.set.nuisance);
         let sigma = self.set.rollout_rmse.map(|s| s.max(1e-6));
         let solve = |p: &[f64], windows: &[Window], peaks_free: bool| {
             let parameter = |(j, &start): (usize, &f64)| {
@@ -151,7 +171,7 @@ impl Monitor {
         let axle = |j: usize| (found.parameters[j], found.standard_error(j), p[j]);
         let differs = |(now, error, then): (f64, Option<f64>, f64)| {
             let change = (now - then).abs();
-            error.is_some_and(|e| change > SIGNIFICANT * e) && change > NOTICEABLE * then
+            !silent && error.is_some_and(|e| change > SIGNIFICANT * e) && change > NOTICEABLE * then
         };
         let stamp_ns = |time_s: f64| sequence.start_stamp_ns + (time_s * gripsight_signals::NS_PER_S) as i64;
         Ok(Reading {

@@ -60,7 +60,7 @@ pub(crate) struct Visit<T = f64> {
     pub(crate) state: State<T>,
     pub(crate) input: Input<T>,
     /// Slips, front and rear, that make the force: behind those of the axles by the relaxation length.
-    slip_rad: (T, T),
+    pub(crate) slip_rad: (T, T),
     pull: [T; 2],
 }
 
