@@ -87,9 +87,7 @@ impl Envelope {
             front: Band::new(run, &found.front, &run.direct.tires.front, 0),
             rear: Band::new(run, &found.rear, &run.direct.tires.rear, 4),
         };
-        if !reached
-            && let Some(known) = known(&bands).filter(|known| KNOWN_WITHIN * promise(known) >= held)
-        {
+        if !reached && let Some(known) = known(&bands).filter(|known| KNOWN_WITHIN * promise(known) >= held) {
             bands = known;
         }
         let vehicle = &run.vehicle;

@@ -9,7 +9,7 @@
 
 use gripsight_model::{Rollout, Window};
 use gripsight_signals::{DataHealth, StateSequence};
-use gripsight_vehicle::VehicleParameters;
+use gripsight_vehicle::{GRAVITY_MPS2, VehicleParameters};
 use serde::Serialize;
 
 use crate::data::Data;
@@ -108,10 +108,16 @@ impl Monitor {
         self.read(&Data::new(&usable, &self.vehicle, &DataHealth::of(sequence)?, WINDOWS)?, sequence)
     }
 
-    /// Whether the set says what the car does in a window: all of them where both peaks were reached, else those within its slips by its own account.
+    /// Whether the set says what the car does in a window: of all of them where both peaks were reached, else where slips, by its own account, and lateral
+    /// acceleration are within what it was shown.
     fn speaks_of(&self, model: &TireRollout<'_>, p: &[f64], window: &Window) -> bool {
-        let (reached, valid) = (self.set.peak_reached, self.set.valid_within.slip_rad);
-        let mut within = true;
+        let (reached, valid, promised) =
+            (self.set.peak_reached, self.set.valid_within.slip_rad, &self.set.promised);
+        let most_mps2 = GRAVITY_MPS2 * promised.front.d.min(promised.rear.d);
+        let segment = &model.segments[window.segment];
+        let turned = |k: usize| (segment.v_x_mps[k] * segment.yaw_rate_radps[k]).abs();
+        let both = reached.front && reached.rear;
+        let mut within = both || (window.from..window.from + window.len).all(|k| turned(k) <= most_mps2);
         model.trajectory(p, model.start_guess(window), window, |visit| {
             let (front, rear) = visit.slip_rad;
             within &= reached.front || front.abs() <= valid.front;

@@ -144,9 +144,7 @@ impl Drive {
     /// The plant's own, at the speed of this drive's turns.
     fn gradient(&self, a_y_mps2: f64) -> f64 {
         let speed_mps = steady::speed_in_turns_mps(&self.recording, a_y_mps2);
-        speed_mps
-            .and_then(|v| steady::understeer_rad_per_mps2(&self.case, v, a_y_mps2))
-            .unwrap_or(f64::NAN)
+        speed_mps.and_then(|v| steady::understeer_rad_per_mps2(&self.case, v, a_y_mps2)).unwrap_or(f64::NAN)
     }
 }
 
@@ -162,7 +160,9 @@ fn drawn(seed: u64, duration_s: f64) -> Result<Drive> {
 
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let Some((mode, rest)) = arguments.split_first() else { bail!("no_v_y, lies, bags, foreign, delays or honest?") };
+    let Some((mode, rest)) = arguments.split_first() else {
+        bail!("no_v_y, lies, bags, foreign, delays or honest?")
+    };
     match mode.as_str() {
         "honest" => {}
         "delays" => println!("run,what,delay_s,found_s,sigma_s"),
@@ -203,7 +203,8 @@ fn main() -> Result<()> {
             for folder in folders.iter().map(Path::new) {
                 let (vehicle, sequence) = read(folder, f64::INFINITY)?;
                 let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                let row = |what, sequence: &_| row(&name, what, sequence, &vehicle, None, &|_| f64::NAN, None);
+                let row =
+                    |what, sequence: &_| row(&name, what, sequence, &vehicle, None, &|_| f64::NAN, None);
                 println!("{}", row("as recorded", &sequence));
                 let mut without = sequence.clone();
                 without.v_y_mps.fill(0.0);

@@ -1,6 +1,6 @@
 //! A road whose friction changes while the car is watched.
 
-use gripsight_identification::{Config, PerAxle, ResidualKind, identify};
+use gripsight_identification::{Config, Monitor, PerAxle, ResidualKind, identify};
 use gripsight_reference_car::Friction;
 
 use crate::support::{drive, scenario, with_background};
@@ -52,4 +52,30 @@ fn two_floors_in_one_drive_are_not_averaged() {
         let one = on(mu, Friction::Uniform { mu }, pace);
         assert!(one.accepted, "{:?}", one.reasons);
     }
+}
+
+#[test]
+fn a_car_that_is_driven_harder_has_not_changed_its_grip() {
+    let config = Config { residual: ResidualKind::None, ..Config::default() };
+    let mut watched = 0;
+    for (car, track, mu, seed) in [
+        ("passenger_car", "clover", 0.9, 5),
+        ("formula_student", "club", 0.9, 5),
+        ("race_car", "bean", 0.8, 7),
+        ("f1tenth", "esses", 0.9, 7),
+    ] {
+        let on = |pace, duration_s, seed| {
+            drive(with_background(scenario(car, track, mu, pace, seed)).duration(duration_s))
+        };
+        let (_, hard, vehicle) = on(0.9, 25.0, seed + 2);
+        for pace in [0.3, 0.4] {
+            let (_, gentle, _) = on(pace, 12.0, seed);
+            let outcome = identify(&gentle, &vehicle, None, None, &config, &mut |_| {}).unwrap();
+            let Some(set) = outcome.accepted_set() else { continue };
+            let look = Monitor::new(&vehicle, &set).unwrap().look(&hard).unwrap();
+            assert!(!look.changed, "{car} at {pace}: {:?}", look.notice(&set));
+            watched += 1;
+        }
+    }
+    assert!(watched >= 6, "{watched}");
 }
