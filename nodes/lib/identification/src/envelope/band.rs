@@ -93,3 +93,24 @@ pub(crate) fn half_width(
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_band_ends_where_its_force_is_known_worse_than_to_a_factor() {
+        let band = Band {
+            slip_rad: vec![0.01, 0.02, 0.03, 0.04],
+            force: vec![0.1, 0.2, 0.3, 0.4],
+            half: vec![0.02, 0.05, 0.2, 0.05],
+        };
+        approx::assert_relative_eq!(band.factor(), 3.0, max_relative = 1e-12);
+        // What lies beyond is not known from here on, however well it is known there.
+        let known = band.known(2.0).unwrap();
+        assert_eq!(known.slip_rad, [0.01, 0.02]);
+        assert!(known.factor() < 2.0 && known.furthest_rad() == 0.02);
+        assert_eq!(band.known(4.0), Some(band.clone()));
+        assert_eq!(Band { half: vec![0.1; 4], ..band }.known(2.0), None);
+    }
+}
