@@ -238,12 +238,21 @@ pub fn cross_check(sequence: &StateSequence) -> Result<Checks, SignalError> {
 pub fn steering_check(sequence: &StateSequence, wheelbase_m: f64) -> Result<Option<Check>, SignalError> {
     /// A car that understeers as hard as any, or slides, takes this many times the angle of its curve; one that drifts, less than none at times.
     const MOST: f64 = 6.0;
+    /// Wheels turn no further; in degrees, any drive with curves has more than so much.
+    const WHEELS_RAD: f64 = 0.8;
+    /// Of the values, a share that is no matter of a few.
+    const USUAL: f64 = 0.95;
     sequence.check()?;
     let spans = Spans::of(sequence);
+    let mut angles_rad: Vec<f32> = sequence.steering_rad.iter().map(|d| d.abs()).collect();
+    angles_rad.sort_unstable_by(f32::total_cmp);
+    let usual = angles_rad.get((USUAL * angles_rad.len() as f64) as usize).copied().map_or(0.0, f64::from);
     let Some((steering, angle)) = spans.curvature(wheelbase_m) else { return Ok(None) };
     let pair = Pair::SteeringAndCurvature;
     Ok(slope(&steering, &angle, 0.01).map(|Slope { value, low, high, offset }| {
-        let finding = if value.abs() > MOST && (value.abs() / DEG).ln().abs() < MOST.ln() {
+        // A car that is carried out of its curves at the limit steers many times their angle, too, but by no angle that wheels do not have.
+        let degrees = value.abs() > MOST && (value.abs() / DEG).ln().abs() < MOST.ln();
+        let finding = if degrees && usual > WHEELS_RAD {
             Finding::Unit { signal: "steering", probably: "deg" }
         } else if high < 0.0 {
             Finding::Sign

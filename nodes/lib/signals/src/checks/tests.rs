@@ -179,6 +179,13 @@ fn steering_in_degrees_and_turned_is_told_by_the_curves() {
     assert_eq!(of(1.0), Finding::Agrees);
     assert_eq!(of(-1.0), Finding::Sign);
     assert_eq!(of(57.295_78), Finding::Unit { signal: "steering", probably: "deg" });
+    // Ten times the angle of its curves, and never more than wheels turn: a car that is carried out of them.
+    let check = steering_check(
+        &StateSequence { steering_rad: honest().steering_rad.iter().map(|d| 11.0 * d).collect(), ..honest() },
+        0.33,
+    );
+    let check = check.unwrap().unwrap();
+    assert!(check.ratio > 9.6 && check.finding == Finding::NotTold, "{check:?}");
 }
 
 #[test]
