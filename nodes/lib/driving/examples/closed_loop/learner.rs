@@ -5,7 +5,8 @@ use std::collections::VecDeque;
 use anyhow::Result;
 use gripsight_driving::{Actuator, Driver, Longitudinal, ReachedAt, TireSet, Trust};
 use gripsight_identification::{
-    AcceptedSet, Config, FrictionPrior, Given, GripWatch, Outcome, ResidualKind, Status, Told, identify,
+    AcceptedSet, Config, FrictionPrior, Given, GripLook, GripWatch, Outcome, ResidualKind, Status, Told,
+    identify,
 };
 use gripsight_reference_car::SensorSample;
 use gripsight_signals::{AlignConfig, Aligner, StateSequence, TelemetrySample};
@@ -16,6 +17,9 @@ const WINDOW_S: (f64, f64) = (30.0, 8.0);
 /// A window that grows is looked at again after so long, as `telemetry` gives it out (`first_s` of `params/suite.yaml`, and every half of that).
 const GROWTH_S: f64 = 4.0;
 
+/// A grip that stays fallen is said again after so long.
+const EVERY_NS: i64 = 1_000_000_000;
+
 /// What the identifier does, in process.
 pub(crate) struct Learner {
     vehicle: VehicleParameters,
@@ -24,6 +28,8 @@ pub(crate) struct Learner {
     recent: VecDeque<TelemetrySample>,
     in_use: Option<AcceptedSet>,
     watch: Option<GripWatch>,
+    /// Stamp at which the set in use was last said to give less than it promises; `None` while it is in force.
+    withdrawn_ns: Option<i64>,
     config: Config,
     /// Length from which a window that grows is looked at next.
     due_s: f64,
@@ -40,6 +46,7 @@ impl Learner {
             recent: VecDeque::new(),
             in_use: None,
             watch: None,
+            withdrawn_ns: None,
             config: Config { residual: ResidualKind::None, ..Config::default() },
             due_s: WINDOW_S.1,
             promised: None,
@@ -55,8 +62,10 @@ impl Learner {
         self.aligner.push(sample.measurement(1_000_000_000))?;
         while let Some(aligned) = self.aligner.poll() {
             let look = self.watch.as_mut().and_then(|watch| watch.push(&aligned));
-            if let Some(look) = look.filter(|look| look.fallen) {
+            let again = |look: &GripLook| self.withdrawn_ns.is_none_or(|at| look.stamp_ns >= at + EVERY_NS);
+            if let Some(look) = look.filter(|look| look.fallen && again(look)) {
                 driver.warn(Some(look.share));
+                self.withdrawn_ns = Some(look.stamp_ns);
             }
             self.recent.push_back(aligned);
             while self.span_s() > WINDOW_S.0 {
@@ -113,11 +122,12 @@ impl Learner {
                     .map_or(String::new(), |p| format!("prior {:.3} {:.3}", p.phi_p.front.d, p.phi_p.rear.d)),
             );
         }
-        if outcome.replaces(self.in_use.as_ref()) {
+        // As the identifier does: one that was withdrawn stands in nobody's way.
+        if outcome.replaces(self.in_use.as_ref().filter(|_| self.withdrawn_ns.is_none())) {
             let trust =
                 if outcome.status == Status::Accepted { Trust::Accepted } else { Trust::AcceptedWithin };
             self.promised = take(driver, &outcome, &outcome.phi_p, trust, verbose);
-            self.in_use = outcome.accepted_set();
+            (self.in_use, self.withdrawn_ns) = (outcome.accepted_set(), None);
             self.watch = self.in_use.as_ref().map(|set| GripWatch::new(&self.vehicle, set)).transpose()?;
         }
         driver.take_longitudinal(told(&outcome.longitudinal));
