@@ -21,6 +21,9 @@ use gripsight_vehicle::{GRAVITY_MPS2, MagicFormula, PacejkaParameters, VehiclePa
 
 use crate::DrivingError;
 
+/// No tire's peak lies at more than this many times the slip at which its stiffness alone would give that force: Magic Formulas with C of 1.25 and more, as
+/// tires have, peak before.
+const LATEST: f64 = 4.0;
 /// Rows of the slip table.
 const ROWS: usize = 200;
 /// Share of the largest force that the table goes up to: at the peak itself the slip is not defined.
@@ -154,7 +157,11 @@ impl SteeringTable {
     /// From the tires.
     #[must_use]
     pub fn new(vehicle: &VehicleParameters, tires: &PacejkaParameters) -> Self {
-        let peak_rad = |tire: &MagicFormula| tire.peak_slip_rad().unwrap_or(1.5);
+        // A curve that rises for ever has no peak, and gives the last hundredth of its force at any slip.
+        let peak_rad = |tire: &MagicFormula| {
+            let latest_rad = LATEST * tire.d / tire.normalized_stiffness();
+            tire.peak_slip_rad().map_or(latest_rad, |peak| peak.min(latest_rad))
+        };
         let (front, rear) = (peak_rad(&tires.front), peak_rad(&tires.rear));
         let most =
             MOST * tires.front.normalized_force(front).min(tires.rear.normalized_force(rear)).max(1e-3);
@@ -248,5 +255,20 @@ mod tests {
             start.rear.normalized_stiffness(),
             max_relative = 1e-12
         );
+    }
+
+    #[test]
+    fn a_curve_that_rises_for_ever_is_not_steered_to_the_lock() {
+        let axle = |c: f64| MagicFormula::from_stiffness(15.0, c, 0.36, 0.0);
+        let most = |c: f64| {
+            let table = SteeringTable::new(
+                &VehicleParameters::f1tenth(),
+                &PacejkaParameters { front: axle(c), rear: axle(1.4) },
+            );
+            table.slips_rad(table.most_mps2()).0
+        };
+        // Stiffness alone gives the peak at 0.024 rad.
+        assert!(most(1.0) < 0.1 && most(0.9) < 0.1, "{} {}", most(1.0), most(0.9));
+        approx::assert_relative_eq!(most(1.4), axle(1.4).peak_slip_rad().unwrap(), max_relative = 0.2);
     }
 }
