@@ -321,8 +321,10 @@ impl Judge<'_> {
         }
         let by_pose = self.disagrees(Pair::LateralSpeedAndPose);
         let by_force = self.disagrees(Pair::LateralSpeedAndAcceleration);
-        // What poses say has the accelerations in it.
-        let by_force = by_force.filter(|_| !self.agrees(Pair::LateralSpeedAndPose));
+        // What poses say has the accelerations in it. One that agrees with the poses and not with the accelerations was made of the poses, noise and all:
+        // both together know better.
+        let sound = localised && self.agrees(Pair::LateralAccelerationAndMotion);
+        let by_force = by_force.filter(|_| sound || !self.agrees(Pair::LateralSpeedAndPose));
         let Some(check) = by_pose.or(by_force) else { return };
         match check.finding {
             Finding::NotMeasured { share } if localised => {
@@ -343,6 +345,9 @@ impl fmt::Display for EstimatedMotion {
             };
             let why = match channel.why {
                 Why::NotMeasured => "not measured".to_owned(),
+                Why::Contradicted { pair: Pair::LateralSpeedAndAcceleration, ratio } => {
+                    format!("its change is {ratio:.2} times what the accelerations leave for it")
+                }
                 Why::Contradicted { ratio, .. } => {
                     format!("recorded as {ratio:.2} times what the poses have")
                 }

@@ -100,12 +100,19 @@ fn no_part_of_the_indy_cars_laps_shows_a_peak() {
 }
 
 #[test]
-fn a_poor_v_y_is_named() {
+fn a_v_y_that_was_made_of_the_poses_is_named_and_replaced() {
     let Some((sequence, vehicle)) = recorded("f1tenth_ds5", f64::INFINITY) else { return };
     let outcome = run(&sequence, &vehicle, None, ResidualKind::None);
-    assert!(!outcome.accepted);
-    assert!(outcome.reasons.iter().any(|r| r.starts_with("v_y scatters by 0.1")), "{:?}", outcome.reasons);
-    assert!(outcome.drive_next.iter().any(|d| d.contains("v_y")));
+    let estimated = outcome.recorded.estimated.as_ref().unwrap();
+    let channels: Vec<_> = estimated.channels.iter().map(|c| c.channel).collect();
+    // The recorded one scatters by 0.1 m/s.
+    assert!(channels == ["v_y_mps"] && estimated.channels[0].sigma < 0.05, "{estimated:?}");
+    let said = "its change is 0.17 times what the accelerations leave for it";
+    assert!(outcome.reasons.iter().any(|r| r.contains(said)), "{:?}", outcome.reasons);
+    // No more than the car turned with.
+    let held = sequence.v_x_mps.iter().zip(&sequence.yaw_rate_radps).map(|(v, r)| (v * r).abs());
+    let most_g = f64::from(held.fold(0.0, f32::max)) / 9.81;
+    assert!(outcome.accepted && outcome.phi_p.front.d < most_g, "{:?} {most_g}", outcome.reasons);
 }
 
 #[test]
