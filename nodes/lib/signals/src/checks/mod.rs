@@ -238,8 +238,10 @@ pub fn cross_check(sequence: &StateSequence) -> Result<Checks, SignalError> {
 pub fn steering_check(sequence: &StateSequence, wheelbase_m: f64) -> Result<Option<Check>, SignalError> {
     /// A car that understeers as hard as any, or slides, takes this many times the angle of its curve; one that drifts, less than none at times.
     const MOST: f64 = 6.0;
-    /// Wheels turn no further; in degrees, any drive with curves has more than so much.
+    /// Wheels turn no further; in degrees, any drive with corners has more than so much.
     const WHEELS_RAD: f64 = 0.8;
+    /// A gentle drive has not, but does not slide either: its ratio is degrees' own to within this factor.
+    const CLOSE: f64 = 2.0;
     /// Of the values, a share that is no matter of a few.
     const USUAL: f64 = 0.95;
     sequence.check()?;
@@ -251,8 +253,9 @@ pub fn steering_check(sequence: &StateSequence, wheelbase_m: f64) -> Result<Opti
     let pair = Pair::SteeringAndCurvature;
     Ok(slope(&steering, &angle, 0.01).map(|Slope { value, low, high, offset }| {
         // A car that is carried out of its curves at the limit steers many times their angle, too, but by no angle that wheels do not have.
-        let degrees = value.abs() > MOST && (value.abs() / DEG).ln().abs() < MOST.ln();
-        let finding = if degrees && usual > WHEELS_RAD {
+        let off = (value.abs() / DEG).ln().abs();
+        let degrees = value.abs() > MOST && off < MOST.ln() && (usual > WHEELS_RAD || off < CLOSE.ln());
+        let finding = if degrees {
             Finding::Unit { signal: "steering", probably: "deg" }
         } else if high < 0.0 {
             Finding::Sign

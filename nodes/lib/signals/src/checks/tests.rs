@@ -179,6 +179,13 @@ fn steering_in_degrees_and_turned_is_told_by_the_curves() {
     assert_eq!(of(1.0), Finding::Agrees);
     assert_eq!(of(-1.0), Finding::Sign);
     assert_eq!(of(57.295_78), Finding::Unit { signal: "steering", probably: "deg" });
+    // In degrees, a gentle drive never has an angle beyond what wheels turn in radians.
+    let mut gentle = honest();
+    scaled(&mut gentle.yaw_rate_radps, 0.15);
+    scaled(&mut gentle.steering_rad, 0.15 * 57.295_78);
+    assert!(gentle.steering_rad.iter().all(|d| d.abs() < 0.8));
+    let check = steering_check(&gentle, 0.33).unwrap().unwrap();
+    assert_eq!(check.finding, Finding::Unit { signal: "steering", probably: "deg" }, "{check:?}");
     // Ten times the angle of its curves, and never more than wheels turn: a car that is carried out of them.
     let check = steering_check(
         &StateSequence { steering_rad: honest().steering_rad.iter().map(|d| 11.0 * d).collect(), ..honest() },
