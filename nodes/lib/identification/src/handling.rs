@@ -9,8 +9,8 @@
 //! curves for independent. By their joint covariance it is half as wide, and too narrow: what a single-track model does not have (compliance, roll steer,
 //! load that moves as the car brakes and accelerates in its corners) is not the same at both axles. Of the reference car's drives in
 //! `tests/results/identification/signals.md`, whose true gradient is that of a steady turn of the plant, 61 of 64 lie within it without v_y; of others' plants
-//! (`plants.md`) all. A regression of steering less curve on the lateral acceleration, without a tire, was tried: it gives the same value, since cars on tracks
-//! turn while they brake or accelerate, and narrower intervals that miss the truth in half of the drives. (Pacejka, Tire and Vehicle Dynamics, 3rd edition,
+//! (`plants.md`) all. A regression of steering less curve on the lateral acceleration, without a tire, gives the same value, since cars on tracks
+//! turn while they brake or accelerate, with an interval that is too narrow on the 1:10 car. (Pacejka, Tire and Vehicle Dynamics, 3rd edition,
 //! 1.3.1; ISO 4138.)
 
 use gripsight_vehicle::{GRAVITY_MPS2, MagicFormula, PacejkaParameters};
