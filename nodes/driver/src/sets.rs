@@ -35,7 +35,8 @@ pub(crate) fn read(message: &PacejkaParams, vehicle_hash: &str, provisional: boo
         tires: PacejkaParameters { front: formula(&message.front), rear: formula(&message.rear) },
         trust,
         valid_slip_rad: [message.front_valid_slip_rad, message.rear_valid_slip_rad],
-        likely_peak: Some(weaker.friction.value).filter(|peak| peak.is_finite()),
+        likely_peaks: Some([front.friction.value, rear.friction.value])
+            .filter(|peaks| peaks.iter().all(|peak| peak.is_finite() && *peak > 0.0)),
         peak_reached: weaker.reached,
         actuator: Actuator {
             delay_s: signals.steering_delay_s.max(0.0),
@@ -91,7 +92,7 @@ mod tests {
     #[test]
     fn a_set_comes_with_what_it_is_good_for() {
         let Said::Set(set) = read(&message(PacejkaParams::ACCEPTED_WITHIN), "a", false) else { panic!() };
-        assert_eq!((set.trust, set.likely_peak), (Trust::AcceptedWithin, Some(0.85)));
+        assert_eq!((set.trust, set.likely_peaks), (Trust::AcceptedWithin, Some([0.9, 0.85])));
         assert_eq!((set.actuator.delay_s, set.actuator.gain), (0.0, 1.1));
         assert_eq!(set.grip(), set.tires.front.max_force_within(0.1));
         set.check().unwrap();

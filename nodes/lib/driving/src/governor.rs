@@ -26,10 +26,13 @@ const LOOK_S: f64 = 0.2;
 const ASKED: f64 = 0.8;
 /// Share of what was promised below which the grip is less than planned.
 const GIVEN: f64 = 0.88;
-/// The same for one axle, which may lose some to the drive and to the load that moves.
+/// The same for one axle, which is known less well.
 const GIVEN_AXLE: f64 = 0.7;
-/// Looks in a row that must say so: noise alone never does.
-const LOOKS: u32 = 4;
+/// What must be missing beyond that, share times seconds: looks overlap, and their noise lasts as long as they do. A fifth less shows after 40 ms, a few
+/// hundredths less after a fifth of a second (Page's cumulative sum).
+const MISSING_S: f64 = 0.008;
+/// The same on tires that nobody measured, which promise too much far more often.
+const MISSING_ASSUMED_S: f64 = 0.001;
 /// Shares of the planned grip between which the stiffness shows.
 const STIFFNESS_SHOWS: std::ops::Range<f64> = 0.06..0.25;
 /// What a look less counts than the next, for the stiffness.
@@ -60,18 +63,33 @@ struct Seen {
     assumed_mps2: [f64; 2],
 }
 
+/// An axle, or the car as a whole, over a look: accelerations over the mass that it carries.
+#[derive(Debug, Clone, Copy, Default)]
+struct Look {
+    given: f64,
+    promised: f64,
+    /// Share of the largest promise that is left beside what drives and brakes it, with the load that it carries then.
+    left: f64,
+    along: f64,
+    /// Load over that of the car at rest.
+    gain: f64,
+    /// Share of the promise that is enough.
+    enough: f64,
+}
+
 /// Watches a plan.
 #[derive(Debug, Clone)]
 pub(crate) struct Governor {
     recent: VecDeque<Seen>,
-    low: u32,
+    /// Share of the promise that was missing lately, times seconds.
+    missing_s: f64,
     /// Sums of given times promised and of promised squared, where little is asked: the stiffness of the car's tires over those assumed.
     stiffness: (f64, f64),
 }
 
 impl Default for Governor {
     fn default() -> Self {
-        Self { recent: VecDeque::new(), low: 0, stiffness: (0.0, 0.0) }
+        Self { recent: VecDeque::new(), missing_s: 0.0, stiffness: (0.0, 0.0) }
     }
 }
 
@@ -79,7 +97,7 @@ impl Governor {
     /// Forgets what it has seen: after a new plan.
     pub(crate) fn reset(&mut self) {
         self.recent.clear();
-        self.low = 0;
+        self.missing_s = 0.0;
     }
 
     fn stiffer(&self) -> f64 {
@@ -136,36 +154,53 @@ impl Governor {
             (sideways + turning / vehicle.l_r_m) / mean(0, n, &|s| s.cos).max(0.5),
             sideways - turning / vehicle.l_f_m,
         ];
-        let (mut road, mut sums): (Option<f64>, _) = (None, [0.0; 2]);
-        let mut looks = Vec::with_capacity(3);
-        // What drives or brakes each axle, over the mass that it carries.
+        // What drives or brakes each axle, over the mass that it carries, and what its load gains by that.
         let a_x = slope(&|s| s.v_x_mps) - mean(0, n, &|s| s.v_y_mps * s.yaw_rate_radps);
         let front = if a_x > 0.0 { vehicle.front_drive_share() } else { vehicle.front_brake_share() };
         let weight_n = loads[0] + loads[1];
         let along = [front * a_x * weight_n / loads[0], (1.0 - front) * a_x * weight_n / loads[1]];
+        let moved_n = vehicle.mass_kg * a_x * vehicle.h_cg_m / vehicle.wheelbase_m();
+        let gains = [1.0 - moved_n / loads[0], 1.0 + moved_n / loads[1]].map(|gain| gain.max(0.1));
+        // Tires that also drive or brake push less to the side.
+        let beside = |along: f64, gain: f64| (1.0 - (along / (gain * most)).powi(2)).max(0.1).sqrt();
+        let mut looks = Vec::with_capacity(3);
+        let mut both =
+            Look { left: beside(a_x, 1.0), along: a_x, gain: 1.0, enough: GIVEN, ..Look::default() };
         for (axle, given) in given.into_iter().enumerate() {
-            let promised = mean(0, n, &|s| s.promised_mps2[axle]);
             let alone = mean(0, n, &|s| s.assumed_mps2[axle]);
             if assumed && STIFFNESS_SHOWS.contains(&(alone.abs() / most)) {
                 let (both, square) = self.stiffness;
                 self.stiffness = (FORGETS * both + given * alone, FORGETS * square + alone * alone);
             }
-            sums = [sums[0] + loads[axle] * given, sums[1] + loads[axle] * promised];
-            looks.push((given, promised, along[axle], GIVEN_AXLE));
+            let gain = gains[axle];
+            let left = gain * beside(along[axle], gain);
+            let promised = left * mean(0, n, &|s| s.promised_mps2[axle]);
+            both.given += loads[axle] / weight_n * given;
+            both.promised += loads[axle] / weight_n * promised;
+            looks.push(Look { given, promised, left, along: along[axle], gain, enough: GIVEN_AXLE });
         }
-        looks.push((sums[0] / weight_n, sums[1] / weight_n, a_x, GIVEN));
-        for (given, promised, along, enough) in looks {
-            // Tires that also drive or brake push less to the side.
-            let left = (1.0 - (along / most).powi(2)).max(0.1).sqrt();
-            let promised = left * promised;
+        looks.push(both);
+        let mut road: Option<f64> = None;
+        // Share of what is enough that is missing most; negative where all is there.
+        let mut missing = f64::NEG_INFINITY;
+        for Look { given, promised, left, along, gain, enough } in looks {
             let share = given / promised;
-            if promised.abs() > ASKED * most * left && share < enough {
-                let grip = (share.max(0.2) * promised).hypot(along) / GRAVITY_MPS2;
-                road = Some(road.map_or(grip, |other| other.min(grip)));
+            if promised.abs() > ASKED * most * left {
+                missing = missing.max(enough - share);
+                if share < enough {
+                    let grip = (share.max(0.2) * promised).hypot(along) / (gain * GRAVITY_MPS2);
+                    road = Some(road.map_or(grip, |other| other.min(grip)));
+                }
             }
         }
-        self.low = if road.is_some() { self.low + 1 } else { 0 };
-        Some(Looked { turned: sideways.abs() / GRAVITY_MPS2, given: road.filter(|_| self.low >= LOOKS) })
+        let since_s = self.recent.get(n.wrapping_sub(2)).map_or(0.0, |last| state.stamp_s - last.stamp_s);
+        self.missing_s =
+            if missing.is_finite() { (self.missing_s + missing * since_s).max(0.0) } else { 0.0 };
+        let enough_s = if assumed { MISSING_ASSUMED_S } else { MISSING_S };
+        Some(Looked {
+            turned: sideways.abs() / GRAVITY_MPS2,
+            given: road.filter(|_| self.missing_s > enough_s),
+        })
     }
 }
 

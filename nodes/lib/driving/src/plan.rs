@@ -5,7 +5,7 @@ use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 use crate::Track;
 use crate::predictive::PathModel;
 use crate::profile::{Drivetrain, Limits, SpeedProfile};
-use crate::tires::{SteeringTable, with_peak};
+use crate::tires::{SteeringTable, TireSet, with_grip};
 
 /// Share of the tires' peak that steering counts on however little is planned.
 const STEERS: f64 = 0.7;
@@ -25,20 +25,22 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    /// The tires with their weaker peak a little above what is planned, so that the plan stays below it.
+    /// The tires of a set with their grip a little above what is planned, so that the plan stays below it.
     pub(crate) fn new(
         vehicle: &VehicleParameters,
         drivetrain: &Drivetrain,
         track: &Track,
-        tires: &PacejkaParameters,
+        set: &TireSet,
         grip: f64,
     ) -> Self {
+        let TireSet { tires, likely_peaks, .. } = set;
         let known = tires.front.d.min(tires.rear.d);
         // A plan beyond what the set promises is steered with some room above it, too.
         let peak = if grip > known { grip / ROOM } else { known };
         // A car that is faster than a plan that was taken back still needs all that its tires give.
-        let tires = with_peak(tires, peak.min((grip / ROOM).max(STEERS * peak)));
-        let limits = Limits::new(vehicle, grip, drivetrain);
+        let likely_peaks = likely_peaks.unwrap_or([tires.front.d, tires.rear.d]);
+        let tires = with_grip(tires, likely_peaks, peak.min((grip / ROOM).max(STEERS * peak)));
+        let limits = Limits::new(vehicle, &tires, grip, drivetrain);
         Self {
             profile: SpeedProfile::new(track, &limits),
             table: SteeringTable::new(vehicle, &tires),

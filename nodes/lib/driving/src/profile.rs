@@ -1,18 +1,23 @@
 //! The fastest speed along a line within the grip.
 //!
 //! ```text
-//! v       <= sqrt(a_y,max/|curvature|)
+//! v       <= sqrt(a_y,max/|curvature|)      a_y,max: of a steady turn at that curvature
 //! v_{i+1}^2 = v_i^2 + 2 a_x ds,   (a_x/a_x,max)^2 + (a_y/a_y,max)^2 <= 1
 //! ```
 //!
 //! forward with what drives the car, backward with what brakes it.
 
-use gripsight_vehicle::{GRAVITY_MPS2, VehicleParameters};
+use gripsight_vehicle::{GRAVITY_MPS2, PacejkaParameters, VehicleParameters};
 
+use crate::tires::SteeringTable;
 use crate::{Longitudinal, Track};
 
 /// Share of the tires' longitudinal limit to plan with: rolling loads and the speed controller need the rest.
 const LONGITUDINAL_SHARE: f64 = 0.85;
+
+/// Turns, in wheelbases over radius: the last one is tighter than cars turn.
+const TURNS: usize = 17;
+const TURN_STEP: f64 = 0.05;
 
 /// A car that its drag would stop is still driven.
 const SLOWEST_MPS: f64 = 0.2;
@@ -35,8 +40,11 @@ pub struct Drivetrain {
 /// Accelerations that the car may use.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Limits {
-    /// Sideways.
+    /// Sideways, straight on: the grip.
     pub lateral_mps2: f64,
+    /// Sideways in turns that are ever tighter, over that: at curvatures [`TURN_STEP`]/wheelbase apart.
+    turns: [f64; TURNS],
+    wheelbase_m: f64,
     /// Forward, on the tires.
     pub drive_mps2: f64,
     /// Backward, positive.
@@ -50,10 +58,17 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// At a grip (acceleration over g that both axles may use).
+    /// At a grip (force over the load that the weaker axle may use) on tires.
     #[must_use]
-    pub fn new(vehicle: &VehicleParameters, grip: f64, drivetrain: &Drivetrain) -> Self {
+    pub fn new(
+        vehicle: &VehicleParameters,
+        tires: &PacejkaParameters,
+        grip: f64,
+        drivetrain: &Drivetrain,
+    ) -> Self {
         let wheelbase = vehicle.wheelbase_m();
+        let table = SteeringTable::new(vehicle, tires);
+        let turn = |k: usize| table.turns(TURN_STEP * k as f64 / wheelbase, grip) / grip;
         let loads = [vehicle.l_r_m / wheelbase, vehicle.l_f_m / wheelbase];
         // Load that moves to the front per g of deceleration.
         let shift = vehicle.h_cg_m / wheelbase;
@@ -68,6 +83,8 @@ impl Limits {
         };
         Self {
             lateral_mps2: grip * GRAVITY_MPS2,
+            turns: std::array::from_fn(turn),
+            wheelbase_m: wheelbase,
             drive_mps2: most(vehicle.front_drive_share(), -shift).min(drivetrain.drive_mps2),
             brake_mps2: most(vehicle.front_brake_share(), shift).min(drivetrain.brake_mps2),
             power_w_per_kg: drivetrain.power_w_per_kg,
@@ -76,10 +93,18 @@ impl Limits {
         }
     }
 
-    /// Share of the longitudinal limit left beside a lateral acceleration.
+    /// Largest lateral acceleration of a turn.
     #[must_use]
-    pub fn left_beside(&self, lateral_mps2: f64) -> f64 {
-        let used = (lateral_mps2 / self.lateral_mps2).abs().min(1.0);
+    pub fn lateral_at_mps2(&self, curvature_1pm: f64) -> f64 {
+        let place = (curvature_1pm.abs() * self.wheelbase_m / TURN_STEP).min((TURNS - 1) as f64);
+        let k = (place as usize).min(TURNS - 2);
+        self.lateral_mps2 * (self.turns[k] + (place - k as f64) * (self.turns[k + 1] - self.turns[k]))
+    }
+
+    /// Share of the longitudinal limit left beside a lateral acceleration in a turn.
+    #[must_use]
+    pub fn left_beside(&self, lateral_mps2: f64, curvature_1pm: f64) -> f64 {
+        let used = (lateral_mps2 / self.lateral_at_mps2(curvature_1pm)).abs().min(1.0);
         (1.0 - used * used).sqrt()
     }
 
@@ -89,17 +114,19 @@ impl Limits {
         self.drive_mps2.min(self.power_w_per_kg / speed_mps.max(0.1))
     }
 
-    /// Speed gained a second at most, beside a lateral acceleration: what holds the car back is made up for by the driver.
+    /// Speed gained a second at most in a turn: what holds the car back is made up for by the driver.
     #[must_use]
-    pub fn gains_mps2(&self, speed_mps: f64, lateral_mps2: f64) -> f64 {
-        let pushed = self.drive_at_mps2(speed_mps) * self.left_beside(lateral_mps2);
+    pub fn gains_mps2(&self, speed_mps: f64, curvature_1pm: f64) -> f64 {
+        let left = self.left_beside(speed_mps * speed_mps * curvature_1pm, curvature_1pm);
+        let pushed = self.drive_at_mps2(speed_mps) * left;
         pushed.min(self.told.reached_mps2(speed_mps)[0])
     }
 
-    /// Speed lost a second at most, beside a lateral acceleration: what holds the car back helps, and is kept as room.
+    /// Speed lost a second at most in a turn: what holds the car back helps, and is kept as room.
     #[must_use]
-    pub fn loses_mps2(&self, speed_mps: f64, lateral_mps2: f64) -> f64 {
-        let braked = self.brake_mps2 * self.left_beside(lateral_mps2);
+    pub fn loses_mps2(&self, speed_mps: f64, curvature_1pm: f64) -> f64 {
+        let left = self.left_beside(speed_mps * speed_mps * curvature_1pm, curvature_1pm);
+        let braked = self.brake_mps2 * left;
         braked.min(self.told.reached_mps2(speed_mps)[1])
     }
 }
@@ -117,21 +144,22 @@ impl SpeedProfile {
     pub fn new(track: &Track, limits: &Limits) -> Self {
         let curvature: Vec<f64> = track.points().iter().map(|p| p.curvature_1pm).collect();
         let step_m = track.step_m();
-        let fastest = |k: &f64| (limits.lateral_mps2 / k.abs().max(1e-9)).sqrt().min(limits.top_speed_mps);
+        let fastest =
+            |k: &f64| (limits.lateral_at_mps2(*k) / k.abs().max(1e-9)).sqrt().min(limits.top_speed_mps);
         let mut speeds_mps: Vec<f64> = curvature.iter().map(fastest).collect();
         let count = speeds_mps.len();
         // Two laps each way: the second sees the end of the first.
         for i in 0..2 * count {
             let (here, next) = (i % count, (i + 1) % count);
             let v = speeds_mps[here];
-            let a = limits.gains_mps2(v, v * v * curvature[here]);
+            let a = limits.gains_mps2(v, curvature[here]);
             speeds_mps[next] =
                 speeds_mps[next].min((v * v + 2.0 * a * step_m).max(SLOWEST_MPS.powi(2)).sqrt());
         }
         for i in (0..2 * count).rev() {
             let (here, next) = (i % count, (i + 1) % count);
             let v = speeds_mps[next];
-            let a = limits.loses_mps2(v, v * v * curvature[next]);
+            let a = limits.loses_mps2(v, curvature[next]);
             speeds_mps[here] = speeds_mps[here].min((v * v + 2.0 * a * step_m).sqrt());
         }
         Self { speeds_mps, step_m }
@@ -160,11 +188,13 @@ impl SpeedProfile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ReachedAt;
+    use crate::{ReachedAt, TireSet};
 
     fn limits() -> Limits {
         Limits {
             lateral_mps2: 8.0,
+            turns: [1.0; TURNS],
+            wheelbase_m: 1.0,
             drive_mps2: 4.0,
             brake_mps2: 6.0,
             power_w_per_kg: 60.0,
@@ -216,6 +246,8 @@ mod tests {
         let track = stadium();
         let strong = |lateral_mps2: f64| Limits {
             lateral_mps2,
+            turns: [1.0; TURNS],
+            wheelbase_m: 1.0,
             drive_mps2: lateral_mps2,
             brake_mps2: lateral_mps2,
             power_w_per_kg: f64::INFINITY,
@@ -240,7 +272,7 @@ mod tests {
                 drive_front_share: Some(drive_front_share),
                 ..VehicleParameters::f1tenth()
             };
-            Limits::new(&vehicle, 0.8, &drivetrain).drive_mps2
+            Limits::new(&vehicle, &TireSet::start_at(0.8).tires, 0.8, &drivetrain).drive_mps2
         };
         let car = VehicleParameters::f1tenth();
         // Front drive, by hand: a = mu g l_r/(L + mu h).

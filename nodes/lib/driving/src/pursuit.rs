@@ -19,19 +19,20 @@ const TRIM_UP_TO: f64 = 0.9;
 /// Time in which wheels that lag are brought where they are wanted.
 const LEAD_S: f64 = 0.06;
 
-/// How far pursuit looks ahead.
+/// How far pursuit looks ahead: the farther, the more corners are cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pursuit {
     /// Time ahead.
     pub ahead_s: f64,
-    /// Distance ahead at least, in wheelbases.
-    pub at_least_wheelbases: f64,
+    /// Distance beside that: a longer car turns in more slowly.
+    pub ahead_wheelbases: f64,
 }
 
 impl Default for Pursuit {
-    /// Keeps the line best at the limit on the development tracks (club, esses, clover; 1:10 and passenger car) of 0.20 to 0.35 s.
+    /// Uses most of the grip on the development tracks (club, esses, clover; 1:10 and passenger car; mu = 0.4, 0.65, 0.9) of 0.16 to 0.36 s and 0 to 1.5
+    /// wheelbases, without leaving them.
     fn default() -> Self {
-        Self { ahead_s: 0.32, at_least_wheelbases: 1.5 }
+        Self { ahead_s: 0.17, ahead_wheelbases: 1.0 }
     }
 }
 
@@ -53,7 +54,7 @@ impl Pursuing {
         let table = &at.plan.table;
         let wheelbase_m = at.vehicle.wheelbase_m();
         let speed = car.v_x_mps.hypot(car.v_y_mps).max(0.1);
-        let ahead_m = (self.pursuit.ahead_s * speed).max(self.pursuit.at_least_wheelbases * wheelbase_m);
+        let ahead_m = self.pursuit.ahead_s * speed + self.pursuit.ahead_wheelbases * wheelbase_m;
         let aim = at.track.at(place.station_m + ahead_m);
         let (sin, cos) = car.course_rad().sin_cos();
         let (dx, dy) = (aim.x_m - car.x_m, aim.y_m - car.y_m);

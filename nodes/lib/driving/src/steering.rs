@@ -14,7 +14,7 @@ use crate::{Place, Track};
 
 /// Delays below this are not worth a prediction.
 pub(crate) const PROMPT_S: f64 = 0.004;
-/// Front slip over that of the largest planned force from which more only scrubs.
+/// Front slip over that of the axle's largest force from which more only scrubs.
 const MOST_SLIP: f64 = 1.15;
 
 /// Which controller steers.
@@ -113,8 +113,7 @@ impl Moment<'_> {
     pub(crate) fn within_slip(&self, car: &CarState, angle_rad: f64) -> f64 {
         let ahead = car.v_y_mps + self.vehicle.l_f_m * car.yaw_rate_radps;
         let front_rad = ahead.atan2(car.v_x_mps.max(0.1));
-        let table = &self.plan.table;
-        let slip_rad = MOST_SLIP * table.slips_rad(table.most_mps2()).0;
+        let slip_rad = MOST_SLIP * self.plan.table.front_slip_rad();
         angle_rad.clamp(front_rad - slip_rad, front_rad + slip_rad)
     }
 }

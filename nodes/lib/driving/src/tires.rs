@@ -28,6 +28,8 @@ const LATEST: f64 = 4.0;
 const ROWS: usize = 200;
 /// Share of the largest force that the table goes up to: at the peak itself the slip is not defined.
 const MOST: f64 = 0.995;
+/// Forces of the front axle that the largest turn is searched over.
+const STEPS: usize = 50;
 
 /// What a set may be used for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,9 +72,9 @@ pub struct TireSet {
     pub trust: Trust,
     /// Slips up to which the set is valid, front and rear, rad; infinite or NaN where not stated.
     pub valid_slip_rad: [f64; 2],
-    /// Most likely peak over the load of the weaker axle, where somebody says; the set itself may promise less.
-    pub likely_peak: Option<f64>,
-    /// Whether the data reach that peak.
+    /// Most likely peaks over the load, front and rear, where somebody says; the set itself may promise less, of one axle more so than of the other.
+    pub likely_peaks: Option<[f64; 2]>,
+    /// Whether the data reach that of the weaker axle.
     pub peak_reached: bool,
     /// The steering actuator as identified with them.
     pub actuator: Actuator,
@@ -87,7 +89,7 @@ impl TireSet {
             tires,
             trust: Trust::Assumed,
             valid_slip_rad,
-            likely_peak: None,
+            likely_peaks: None,
             peak_reached: false,
             actuator: Actuator::default(),
         }
@@ -135,64 +137,77 @@ impl TireSet {
     }
 }
 
-/// The same tires with another peak: stiffness and shape stay.
-pub(crate) fn with_peak(tires: &PacejkaParameters, grip: f64) -> PacejkaParameters {
-    let weaker = tires.front.d.min(tires.rear.d);
-    let axle = |t: &MagicFormula| {
-        MagicFormula::from_stiffness(t.normalized_stiffness(), t.c, t.d * grip / weaker, t.e)
-    };
-    PacejkaParameters { front: axle(&tires.front), rear: axle(&tires.rear) }
+/// The same tires with a grip to plan and steer with: stiffness and shape stay. The front axle has that grip, the rear one no less, and as much more as
+/// is likely: a table of a car that oversteers asks for less angle the more the car is to turn, and leads it off the track or spins it.
+pub(crate) fn with_grip(tires: &PacejkaParameters, likely_peaks: [f64; 2], grip: f64) -> PacejkaParameters {
+    let axle = |t: &MagicFormula, d: f64| MagicFormula::from_stiffness(t.normalized_stiffness(), t.c, d, t.e);
+    let more = (likely_peaks[1] / likely_peaks[0]).max(1.0);
+    PacejkaParameters { front: axle(&tires.front, grip), rear: axle(&tires.rear, grip * more) }
 }
 
 /// The steering table of a car on some tires.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SteeringTable {
     wheelbase_m: f64,
+    front: Column,
+    rear: Column,
+}
+
+/// Slip angles of an axle by the force over the load, up to almost its largest.
+#[derive(Debug, Clone, PartialEq)]
+struct Column {
     most: f64,
-    front_rad: Vec<f64>,
-    rear_rad: Vec<f64>,
+    slips_rad: Vec<f64>,
+}
+
+impl Column {
+    fn new(tire: &MagicFormula) -> Self {
+        // A curve that rises for ever has no peak, and gives the last hundredth of its force at any slip.
+        let latest_rad = LATEST * tire.d / tire.normalized_stiffness();
+        let peak_rad = tire.peak_slip_rad().map_or(latest_rad, |peak| peak.min(latest_rad));
+        let most = MOST * tire.normalized_force(peak_rad).max(1e-3);
+        let share = |k: usize| most * k as f64 / (ROWS - 1) as f64;
+        Self { most, slips_rad: (0..ROWS).map(|k| slip_of(tire, share(k), peak_rad)).collect() }
+    }
+
+    fn slip_rad(&self, over_g: f64) -> f64 {
+        let place = (over_g / self.most).clamp(0.0, 1.0) * (ROWS - 1) as f64;
+        let row = (place.floor() as usize).min(ROWS - 2);
+        self.slips_rad[row] + (place - row as f64) * (self.slips_rad[row + 1] - self.slips_rad[row])
+    }
 }
 
 impl SteeringTable {
     /// From the tires.
     #[must_use]
     pub fn new(vehicle: &VehicleParameters, tires: &PacejkaParameters) -> Self {
-        // A curve that rises for ever has no peak, and gives the last hundredth of its force at any slip.
-        let peak_rad = |tire: &MagicFormula| {
-            let latest_rad = LATEST * tire.d / tire.normalized_stiffness();
-            tire.peak_slip_rad().map_or(latest_rad, |peak| peak.min(latest_rad))
-        };
-        let (front, rear) = (peak_rad(&tires.front), peak_rad(&tires.rear));
-        let most =
-            MOST * tires.front.normalized_force(front).min(tires.rear.normalized_force(rear)).max(1e-3);
-        let column = |tire: &MagicFormula, peak_rad: f64| {
-            let share = |k: usize| most * k as f64 / (ROWS - 1) as f64;
-            (0..ROWS).map(|k| slip_of(tire, share(k), peak_rad)).collect()
-        };
         Self {
             wheelbase_m: vehicle.wheelbase_m(),
-            most,
-            front_rad: column(&tires.front, front),
-            rear_rad: column(&tires.rear, rear),
+            front: Column::new(&tires.front),
+            rear: Column::new(&tires.rear),
         }
+    }
+
+    fn most(&self) -> f64 {
+        self.front.most.min(self.rear.most)
     }
 
     /// Largest lateral acceleration of the table.
     #[must_use]
     pub fn most_mps2(&self) -> f64 {
-        self.most * GRAVITY_MPS2
+        self.most() * GRAVITY_MPS2
     }
 
     /// Road-wheel angle of a steady turn; beyond the largest acceleration that of the largest.
     #[must_use]
     pub fn steering_rad(&self, lateral_mps2: f64, speed_mps: f64) -> f64 {
-        let over_g = (lateral_mps2.abs() / GRAVITY_MPS2).min(self.most);
+        let over_g = (lateral_mps2.abs() / GRAVITY_MPS2).min(self.most());
         let speed = speed_mps.max(0.1);
         let turn = self.wheelbase_m * over_g * GRAVITY_MPS2 / (speed * speed);
-        let rear_rad = self.slip(&self.rear_rad, over_g);
+        let rear_rad = self.rear.slip_rad(over_g);
         let mut angle_rad = 0.0_f64;
         for _ in 0..8 {
-            let front_rad = self.slip(&self.front_rad, over_g / angle_rad.cos().max(0.5));
+            let front_rad = self.front.slip_rad(over_g / angle_rad.cos().max(0.5));
             angle_rad = (front_rad + (turn - rear_rad.tan()).atan()).clamp(-1.2, 1.2);
         }
         angle_rad.copysign(lateral_mps2 * angle_rad)
@@ -201,15 +216,30 @@ impl SteeringTable {
     /// Slip angles (front, rear) of a steady turn; beyond the largest acceleration those of the largest.
     #[must_use]
     pub fn slips_rad(&self, lateral_mps2: f64) -> (f64, f64) {
-        let over_g = lateral_mps2.abs() / GRAVITY_MPS2;
+        let over_g = (lateral_mps2.abs() / GRAVITY_MPS2).min(self.most());
         let signed = |slip: f64| slip.copysign(lateral_mps2);
-        (signed(self.slip(&self.front_rad, over_g)), signed(self.slip(&self.rear_rad, over_g)))
+        (signed(self.front.slip_rad(over_g)), signed(self.rear.slip_rad(over_g)))
     }
 
-    fn slip(&self, column: &[f64], over_g: f64) -> f64 {
-        let place = (over_g / self.most).clamp(0.0, 1.0) * (ROWS - 1) as f64;
-        let row = (place.floor() as usize).min(ROWS - 2);
-        column[row] + (place - row as f64) * (column[row + 1] - column[row])
+    /// Slip angle of the front axle's largest force, be the rear one's smaller: a promise is a lower bound, and a car that goes wide needs all of it.
+    #[must_use]
+    pub(crate) fn front_slip_rad(&self) -> f64 {
+        self.front.slip_rad(self.front.most)
+    }
+
+    /// Largest lateral acceleration over g of a steady turn at a curvature, the weaker axle pushing `grip` over its load at most: front wheels push
+    /// square to themselves, so that some of it goes backward in a tight turn, the more the further they are steered into their slip.
+    #[must_use]
+    pub(crate) fn turns(&self, curvature_1pm: f64, grip: f64) -> f64 {
+        let used = grip / self.most();
+        let rear_most = used * self.rear.most;
+        let turn_rad = (self.wheelbase_m * curvature_1pm.abs()).atan();
+        let at = |k: usize| {
+            let front = used * self.front.most * k as f64 / STEPS as f64;
+            let angle_rad = self.front.slip_rad(front) + turn_rad - self.rear.slip_rad(front.min(rear_most));
+            (front * angle_rad.cos().clamp(0.5, 1.0)).min(rear_most)
+        };
+        (STEPS / 2..=STEPS).map(at).fold(0.0, f64::max)
     }
 }
 
@@ -246,15 +276,35 @@ mod tests {
     }
 
     #[test]
-    fn another_peak_keeps_the_stiffness() {
+    fn another_grip_keeps_the_stiffness_and_never_makes_an_oversteering_car() {
         let start = TireSet::start().tires;
-        let more = with_peak(&start, 0.9);
+        let strong = with_grip(&start, [0.8, 1.0], 0.4);
+        approx::assert_relative_eq!(strong.front.d, 0.4, max_relative = 1e-12);
+        approx::assert_relative_eq!(strong.rear.d, 0.5, max_relative = 1e-12);
+        let more = with_grip(&start, [1.0, 0.8], 0.9);
+        approx::assert_relative_eq!(more.rear.d, 0.9, max_relative = 1e-12);
         approx::assert_relative_eq!(more.front.d, 0.9, max_relative = 1e-12);
         approx::assert_relative_eq!(
             more.rear.normalized_stiffness(),
             start.rear.normalized_stiffness(),
             max_relative = 1e-12
         );
+    }
+
+    #[test]
+    fn a_tight_turn_costs_what_steered_wheels_push_backward() {
+        let tires = TireSet::start_at(0.8).tires;
+        let car = VehicleParameters::f1tenth();
+        let table = SteeringTable::new(&car, &tires);
+        assert!(table.turns(0.0, 0.8 * MOST) > 0.79 && table.turns(0.0, 0.4) > 0.399);
+        // By hand: equal tires, so that the wheels stand at the turn's own angle.
+        let tight: f64 = 1.0;
+        let by_hand = 0.4 * (car.wheelbase_m() * tight).atan().cos();
+        approx::assert_relative_eq!(table.turns(tight, 0.4), by_hand, max_relative = 1e-3);
+        // A strong front axle has that to spare.
+        let strong = MagicFormula { d: 1.2 * tires.front.d, ..tires.front };
+        let table = SteeringTable::new(&car, &PacejkaParameters { front: strong, ..tires });
+        approx::assert_relative_eq!(table.turns(tight, 0.4), 0.4, max_relative = 1e-3);
     }
 
     #[test]

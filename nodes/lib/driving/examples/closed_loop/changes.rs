@@ -6,12 +6,11 @@ use std::time::Instant;
 use anyhow::Result;
 use gripsight_driving::{Controller, TireSet};
 use gripsight_reference_car::CarParameters;
-use gripsight_vehicle::PacejkaParameters;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use crate::drive::{Loop, truth};
+use crate::drive::Loop;
 use crate::learner::Learner;
 use crate::run::{Case, Variant};
 use crate::store::{Store, mean, median, parts, quantile};
@@ -94,7 +93,7 @@ struct Plan {
     case: Case,
     knows: Knows,
     /// Friction, the plant's tires on it, and the share of the lap after [`LAPS`] where it ends.
-    floors: Vec<(f64, PacejkaParameters, f64)>,
+    floors: Vec<(f64, TireSet, f64)>,
 }
 
 /// Drives what was asked for and is not in changes.csv yet; the summary.
@@ -146,7 +145,7 @@ fn drive(plan: &Plan, verbose: bool) -> Result<Vec<Row>> {
     let begin = Instant::now();
     let Plan { case, knows, floors } = plan;
     let start = match knows {
-        Knows::Untold | Knows::Told => truth(case.tires),
+        Knows::Untold | Knows::Told => case.tires,
         Knows::Identified | Knows::Prior => TireSet::start(),
     };
     let prior = |mu: f64, floor: usize| match knows {
@@ -164,7 +163,7 @@ fn drive(plan: &Plan, verbose: bool) -> Result<Vec<Row>> {
     let mut rows: Vec<Row> = Vec::new();
     let mut wreck = None;
     for (index, (mu, tires, ends)) in floors.iter().enumerate() {
-        let grip = truth(*tires).grip();
+        let grip = tires.grip();
         let (from_m, laps, exits) = (run.referee.along_m(), run.referee.laps.len(), run.referee.exits());
         let until_m = (laps as f64 + LAPS as f64 + if index > 0 { 1.0 } else { 0.0 } + ends) * lap_m;
         let longest_s = run.sim.time_s() + 4.0 * (LAPS + 2) as f64 * run.referee.fastest_lap_s();
@@ -175,7 +174,7 @@ fn drive(plan: &Plan, verbose: bool) -> Result<Vec<Row>> {
             }
             run.change_floor(*mu, *tires)?;
             if *knows == Knows::Told {
-                run.driver.take(truth(*tires))?;
+                run.driver.take(*tires)?;
             }
             if let Some(learner) = &mut run.learner {
                 learner.look_again(prior(*mu, index));

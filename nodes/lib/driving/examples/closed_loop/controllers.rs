@@ -7,7 +7,7 @@ use gripsight_driving::Controller;
 use gripsight_reference_car::CarParameters;
 use serde::{Deserialize, Serialize};
 
-use crate::drive::{Loop, processor_s, truth};
+use crate::drive::{Loop, processor_s};
 use crate::run::Case;
 use crate::store::{Store, mean, parts};
 use crate::{Arguments, plant};
@@ -77,7 +77,7 @@ pub(crate) fn experiment(arguments: &Arguments) -> Result<String> {
 
 fn drive(case: &Case, name: &str, verbose: bool) -> Result<Row> {
     let begin_s = processor_s();
-    let mut run = Loop::new(case, truth(case.tires), verbose)?;
+    let mut run = Loop::new(case, case.tires, verbose)?;
     run.driver.take_longitudinal(plant::told(&case.car, case.mu));
     let longest_s = 4.0 * case.laps as f64 * run.referee.fastest_lap_s();
     let mut wreck = None;

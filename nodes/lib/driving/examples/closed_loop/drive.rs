@@ -1,9 +1,9 @@
 //! The loop itself: plant, driver, referee and what is learnt, look by look.
 
 use anyhow::{Context, Result};
-use gripsight_driving::{CarState, Driver, Drivetrain, Limits, Settings, TireSet, Trust};
+use gripsight_driving::{CarState, Driver, Drivetrain, Limits, Settings, TireSet};
 use gripsight_reference_car::{Command, Course, EffectSetting, SensorSample, Simulation};
-use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
+use gripsight_vehicle::VehicleParameters;
 
 use crate::effects::Recent;
 use crate::learner::Learner;
@@ -32,11 +32,6 @@ pub(crate) struct Loop {
     verbose: bool,
 }
 
-/// A set that the plant itself stands for.
-pub(crate) fn truth(tires: PacejkaParameters) -> TireSet {
-    TireSet { trust: Trust::Accepted, ..TireSet::assumed(tires) }
-}
-
 /// The processor's time that this thread has taken: other programs do not count.
 pub(crate) fn processor_s() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
@@ -61,7 +56,7 @@ impl Loop {
         let vehicle = plant::vehicle(&case.car)?;
         let drivetrain = plant::drivetrain(&case.car);
         let track = plant::track(&case.car, &case.track, reversed)?;
-        let limits = Limits::new(&vehicle, truth(case.tires).grip(), &drivetrain);
+        let limits = Limits::new(&vehicle, &case.tires.tires, case.tires.grip(), &drivetrain);
         let driver = Driver::new(
             vehicle.clone(),
             drivetrain.clone(),
@@ -91,10 +86,10 @@ impl Loop {
         })
     }
 
-    /// The road changes, everywhere and at once; `tires` are the plant's on it.
-    pub(crate) fn change_floor(&mut self, mu: f64, tires: PacejkaParameters) -> Result<()> {
+    /// The road changes, everywhere and at once; `set`: the plant's tires on it.
+    pub(crate) fn change_floor(&mut self, mu: f64, set: TireSet) -> Result<()> {
         self.sim.set_friction(mu)?;
-        self.referee.floor(&Limits::new(&self.vehicle, truth(tires).grip(), &self.drivetrain));
+        self.referee.floor(&Limits::new(&self.vehicle, &set.tires, set.grip(), &self.drivetrain));
         Ok(())
     }
 

@@ -13,7 +13,7 @@ use gripsight_signals::{AlignConfig, Aligner, StateSequence, TelemetrySample};
 use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 use serde::{Deserialize, Serialize};
 
-use crate::drive::{Loop, truth};
+use crate::drive::Loop;
 use crate::run::Case;
 use crate::store::{Store, mean, parts};
 use crate::{Arguments, plant};
@@ -210,7 +210,7 @@ fn drive(case: &Case, wrong: Wrong, knows: Knows, verbose: bool) -> Result<Vec<R
     let small = case.car.name == "f1tenth";
     let settings = wrong.settings(small).into_iter().map(|(name, value)| EffectSetting::new(name, &[value]));
     let settings = settings.collect::<Result<Vec<_>, _>>()?;
-    let mut run = Loop::paced(case, truth(case.tires), &settings, PACE, verbose)?;
+    let mut run = Loop::paced(case, case.tires, &settings, PACE, verbose)?;
     run.recent = Some(Recent { aligner: Aligner::new(AlignConfig::default()), samples: VecDeque::new() });
     match knows {
         Knows::Told => run.driver.tell(wrong.named(small)),
@@ -228,7 +228,8 @@ fn drive(case: &Case, wrong: Wrong, knows: Knows, verbose: bool) -> Result<Vec<R
             let mut line: (String, Option<Trial>) = (String::new(), None);
             if said.len() + 1 >= FIRST {
                 let named = match (knows, &run.recent) {
-                    (Knows::Diagnosed, Some(recent)) => match recent.diagnose(&run.vehicle, case.tires) {
+                    (Knows::Diagnosed, Some(recent)) => match recent.diagnose(&run.vehicle, case.tires.tires)
+                    {
                         Ok((named, words)) => {
                             line.0 = words;
                             Some(named)

@@ -180,7 +180,7 @@ fn take(
         } else {
             [slip.front, slip.rear]
         },
-        likely_peak: Some(weaker.value),
+        likely_peaks: Some([front.value, rear.value]),
         peak_reached: weaker.reached,
         actuator: Actuator {
             delay_s: signals.steering_delay_s.max(0.0),

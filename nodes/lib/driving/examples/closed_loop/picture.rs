@@ -7,7 +7,7 @@ use gripsight_driving::TireSet;
 use gripsight_reference_car::CarParameters;
 use plotters::prelude::*;
 
-use crate::drive::{Loop, truth};
+use crate::drive::Loop;
 use crate::learner::Learner;
 use crate::run::{Case, Variant};
 use crate::{Arguments, plant};
@@ -49,7 +49,7 @@ pub(crate) fn experiment(arguments: &Arguments) -> Result<String> {
     };
     let mut run = Loop::new(&case, TireSet::start(), arguments.verbose)?;
     run.learner = Some(Learner::new(run.vehicle.clone(), Variant::NoPrior.prior(mu, case.seed)));
-    let grip = truth(tires).grip();
+    let grip = tires.grip();
     let length_m = run.driver.track().length_m();
     let longest_s = 4.0 * LAPS as f64 * run.referee.fastest_lap_s();
     let (mut points, mut looks) = (Vec::new(), 0_usize);

@@ -1,7 +1,7 @@
 //! The reference car, its track, and its tires projected on Phi_p.
 
 use anyhow::{Context, Result};
-use gripsight_driving::{Drivetrain, Longitudinal, Track};
+use gripsight_driving::{Drivetrain, Longitudinal, TireSet, Track, Trust};
 use gripsight_identification::nelder_mead::{NelderMeadConfig, minimize};
 use gripsight_identification::tires::BOUNDS;
 use gripsight_reference_car as reference;
@@ -64,8 +64,8 @@ pub(crate) fn scenario(car: &CarParameters, course: Course, mu: f64, seed: u64) 
 }
 
 /// The effective tires of the plant on a road: the Magic Formulas nearest to its axle forces over the static loads, steered slowly up to the lock
-/// at constant speed, both ways.
-pub(crate) fn projection(car: &CarParameters, mu: f64) -> Result<PacejkaParameters> {
+/// at constant speed, both ways. The axle that gave way there promises no more than it gave; a formula says more beyond.
+pub(crate) fn projection(car: &CarParameters, mu: f64) -> Result<TireSet> {
     let vehicle = vehicle(car)?;
     let loads = [vehicle.static_load_front_n(), vehicle.static_load_rear_n()];
     let mut points: [Vec<(f64, f64)>; 2] = Default::default();
@@ -83,8 +83,18 @@ pub(crate) fn projection(car: &CarParameters, mu: f64) -> Result<PacejkaParamete
             }
         }
     }
+    let reached =
+        points.each_ref().map(|points| points.iter().map(|(slip, _)| slip.abs()).fold(0.0, f64::max));
     let [front, rear] = points.map(|points| nearest(&points));
-    Ok(PacejkaParameters { front: front?, rear: rear? })
+    let tires = PacejkaParameters { front: front?, rear: rear? };
+    // Slip over that at which the stiffness alone would give the force.
+    let into = |tire: &MagicFormula, slip_rad: f64| {
+        slip_rad * tire.normalized_stiffness() / tire.normalized_force(slip_rad)
+    };
+    let front_gave_way = into(&tires.front, reached[0]) > into(&tires.rear, reached[1]);
+    let valid_slip_rad =
+        if front_gave_way { [reached[0], f64::INFINITY] } else { [f64::INFINITY, reached[1]] };
+    Ok(TireSet { trust: Trust::Accepted, valid_slip_rad, ..TireSet::assumed(tires) })
 }
 
 fn nearest(points: &[(f64, f64)]) -> Result<MagicFormula> {

@@ -30,7 +30,7 @@ pub(crate) struct Lap {
 pub(crate) struct Referee {
     track: Track,
     fastest: SpeedProfile,
-    grip_mps2: f64,
+    limits: Limits,
     half_width_m: f64,
     pub(crate) laps: Vec<Lap>,
     lap: Lap,
@@ -50,7 +50,7 @@ impl Referee {
         Self {
             fastest: SpeedProfile::new(&track, limits),
             track,
-            grip_mps2: limits.lateral_mps2,
+            limits: limits.clone(),
             half_width_m,
             laps: Vec::new(),
             lap: Lap::default(),
@@ -68,7 +68,7 @@ impl Referee {
     /// Another floor from now on.
     pub(crate) fn floor(&mut self, limits: &Limits) {
         self.fastest = SpeedProfile::new(&self.track, limits);
-        self.grip_mps2 = limits.lateral_mps2;
+        self.limits = limits.clone();
     }
 
     /// Time of the fastest lap on the true tires, as planned.
@@ -88,7 +88,7 @@ impl Referee {
 
     /// The set in use promises this lateral acceleration over g.
     pub(crate) fn promised(&mut self, now: &TruthSample, grip: Option<f64>) {
-        self.promised = grip.map(|grip| grip * GRAVITY_MPS2 / self.grip_mps2);
+        self.promised = grip.map(|grip| grip * GRAVITY_MPS2 / self.limits.lateral_mps2);
         if let Some(corner_s) = self.corner_s.filter(|_| grip.is_some()) {
             self.first_set_s.get_or_insert(now.motion.time_s - corner_s);
         }
@@ -116,8 +116,9 @@ impl Referee {
         self.looks.0 += 1.0;
         let fastest = self.fastest.at(now.station_m).0;
         let point = self.track.at(now.station_m);
-        if fastest * fastest * point.curvature_1pm.abs() > CORNER * self.grip_mps2 {
-            self.lap.used += m.specific_x_mps2.hypot(m.specific_y_mps2) / self.grip_mps2;
+        let grip_mps2 = self.limits.lateral_at_mps2(point.curvature_1pm);
+        if fastest * fastest * point.curvature_1pm.abs() > CORNER * grip_mps2 {
+            self.lap.used += m.specific_x_mps2.hypot(m.specific_y_mps2) / grip_mps2;
             self.looks.1 += 1.0;
             self.corner_s.get_or_insert(m.time_s);
         }
@@ -125,8 +126,11 @@ impl Referee {
         self.lap.exits += u32::from(outside && !self.outside);
         self.outside = outside;
         let speed = m.v_x_mps.hypot(m.v_y_mps);
-        self.slow =
-            if speed < 0.05 * (self.grip_mps2 * self.track.length_m()).sqrt() { self.slow + 1 } else { 0 };
+        self.slow = if speed < 0.05 * (self.limits.lateral_mps2 * self.track.length_m()).sqrt() {
+            self.slow + 1
+        } else {
+            0
+        };
         if speed > 1.0 && m.v_y_mps.atan2(m.v_x_mps).abs() > 1.0 {
             Some("spin")
         } else if offset_m > 3.0 * self.half_width_m {

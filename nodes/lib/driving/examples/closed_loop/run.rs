@@ -4,11 +4,10 @@ use anyhow::Result;
 use gripsight_driving::{Controller, TireSet};
 use gripsight_identification::FrictionPrior;
 use gripsight_reference_car::CarParameters;
-use gripsight_vehicle::PacejkaParameters;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::drive::{Loop, truth};
+use crate::drive::Loop;
 use crate::learner::Learner;
 use crate::plant;
 use crate::referee::Lap;
@@ -71,7 +70,7 @@ pub(crate) struct Case {
     pub(crate) seed: u64,
     pub(crate) laps: usize,
     /// The plant's tires.
-    pub(crate) tires: PacejkaParameters,
+    pub(crate) tires: TireSet,
     /// Who steers.
     pub(crate) controller: Controller,
 }
@@ -88,7 +87,7 @@ pub(crate) struct Run {
 
 /// Drives it.
 pub(crate) fn drive(case: &Case, variant: Variant, verbose: bool) -> Result<Run> {
-    let start = if variant == Variant::True { truth(case.tires) } else { TireSet::start() };
+    let start = if variant == Variant::True { case.tires } else { TireSet::start() };
     let mut run = Loop::new(case, start, verbose)?;
     if variant == Variant::True {
         run.driver.take_longitudinal(plant::told(&case.car, case.mu));

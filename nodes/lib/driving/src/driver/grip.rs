@@ -84,7 +84,7 @@ impl Driver {
         let assured =
             if self.explores() { (ASSURED * self.turned).min(share * self.start.grip()) } else { 0.0 };
         let over = self.named.grip.map_or(1.0, |[front, rear]| front.min(rear));
-        let likely_peak = base.likely_peak.map(|peak| over * peak);
+        let likely_peak = base.likely_peaks.map(|[front, rear]| over * front.min(rear));
         let likely = likely_peak.unwrap_or(f64::INFINITY);
         let proven = PROVEN.min(step) * self.driven;
         let most = (beyond * shown).max(proven);
@@ -115,8 +115,8 @@ impl Driver {
     }
 
     pub(super) fn renew(&mut self) {
-        let tires = self.named.planned(&self.base().tires);
-        self.plan = Plan::new(&self.vehicle, &self.drivetrain, &self.track, &tires, self.allowed());
+        let set = TireSet { tires: self.named.planned(&self.base().tires), ..*self.base() };
+        self.plan = Plan::new(&self.vehicle, &self.drivetrain, &self.track, &set, self.allowed());
         self.progress.planned(self.plan.grip);
         self.governor.reset();
     }

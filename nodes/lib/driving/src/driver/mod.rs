@@ -93,7 +93,7 @@ impl Driver {
         start.check()?;
         let careful = if start.trust == Trust::Assumed { CAREFUL } else { 1.0 };
         let first = careful * settings.share * start.grip();
-        let plan = Plan::new(&vehicle, &drivetrain, &track, &start.tires, first);
+        let plan = Plan::new(&vehicle, &drivetrain, &track, &start, first);
         let progress = Progress::new(track.length_m(), plan.grip);
         Ok(Self {
             actuator: start.actuator,

@@ -35,7 +35,7 @@ impl Default for Settings {
             controller: Controller::default(),
             pursuit: Pursuit::default(),
             predictive: Predictive::default(),
-            speed_gain_1ps: 4.0,
+            speed_gain_1ps: 8.0,
         }
     }
 }

@@ -6,10 +6,11 @@ use crate::state::CarState;
 
 /// Share of the drive that is always left: cornering alone slows the car.
 const LEAST_DRIVE: f64 = 0.5;
-/// Share of the brakes that is always left: a car that pushes over its front wheels gets slower or leaves.
-const LEAST_BRAKE: f64 = 0.5;
-/// Most that the driver drives against a slide sideways: more upsets a car at its limit.
-const SLIDE_MPS2: f64 = 0.5;
+/// Share of the brakes that is always left beside the turning, at the planned speed and when too fast: a car that pushes over its front wheels gets
+/// slower or leaves.
+const LEAST_BRAKE: [f64; 2] = [0.15, 0.5];
+/// Speed beyond the plan, over that, which is too fast.
+const TOO_FAST: f64 = 0.1;
 /// Share of the half width from which the car slows down.
 const WIDE: f64 = 0.6;
 
@@ -26,20 +27,18 @@ impl Driver {
         let (speed_mps, slope) = self.plan.profile.at(place.station_m + ahead_m);
         let speed_mps = speed_mps * room;
         let turned = state.v_x_mps * state.yaw_rate_radps;
-        // Front tires that steer and a body that slides sideways hold the car back.
-        let slide = -state.v_y_mps * state.yaw_rate_radps;
-        let scrub = slide.clamp(-SLIDE_MPS2, SLIDE_MPS2)
-            + (self.vehicle.l_r_m / self.vehicle.wheelbase_m() * turned * angle_rad.sin()).max(0.0);
-        let left = limits.left_beside(turned);
-        // What holds the car back is made up for where it gains speed. Tires at their limit sideways have nothing left for it, and a car that is
-        // slower than planned where it brakes has room for a corner.
-        let resisted = if slope > 0.0 { left * limits.told.resistance_mps2(state.v_x_mps) } else { 0.0 };
-        let wanted =
-            slope * room + scrub + resisted + self.settings.speed_gain_1ps * (speed_mps - state.v_x_mps);
+        // Front tires that steer and a body that slides sideways hold the car back, and so do air and rolling.
+        let slides = -state.v_y_mps * state.yaw_rate_radps;
+        let scrubs = (self.vehicle.l_r_m / self.vehicle.wheelbase_m() * turned * angle_rad.sin()).max(0.0);
+        let resisted = slides + scrubs + limits.told.resistance_mps2(state.v_x_mps);
+        let left = limits.left_beside(turned, point.curvature_1pm);
+        let wanted = slope * room + resisted + self.settings.speed_gain_1ps * (speed_mps - state.v_x_mps);
         let drive =
             limits.drive_at_mps2(state.v_x_mps) * left.max(LEAST_DRIVE) * if wide > 0.0 { 0.5 } else { 1.0 };
-        // Whoever is too fast for a plan that was taken back has more to brake with than it says beside the turning.
-        let least = if self.held_back() { LEAST_BRAKE } else { 0.15 };
+        // Whoever is too fast, or was too fast for a plan that was taken back, does not get around by steering: the brakes come first.
+        let over = ((state.v_x_mps / speed_mps.max(0.1) - 1.0) / TOO_FAST).clamp(0.0, 1.0);
+        let over = if self.held_back() { 1.0 } else { over };
+        let least = LEAST_BRAKE[0] + (LEAST_BRAKE[1] - LEAST_BRAKE[0]) * over;
         let brake = limits.brake_mps2 * left.max(least);
         (speed_mps, wanted.clamp(-brake, drive))
     }

@@ -194,12 +194,11 @@ fn a_drive_train_that_gives_less_is_asked_for_more() {
         let car = on_the_line(&driver, station_m, v_x_mps);
         (driver.command(&car, 0.0).acceleration_mps2, v_x_mps)
     };
-    let (braked, _) = asked(None, false);
-    approx::assert_relative_eq!(asked(Some(told.clone()), false).0, braked / 0.8, max_relative = 1e-9);
-    let (driven, v) = asked(None, true);
-    // The car goes straight: no share of the grip is needed for turning.
-    let expected = (driven + 0.3 + 0.01 * v * v) / 0.8;
-    approx::assert_relative_eq!(asked(Some(told), true).0, expected, max_relative = 1e-9);
+    for gains in [false, true] {
+        let (alone, v) = asked(None, gains);
+        let expected = (alone + 0.3 + 0.01 * v * v) / 0.8;
+        approx::assert_relative_eq!(asked(Some(told.clone()), gains).0, expected, max_relative = 1e-9);
+    }
 }
 
 #[test]
@@ -217,10 +216,16 @@ fn an_assumed_grip_is_no_promise() {
     approx::assert_relative_eq!(careful.grip(), 0.5 * start, max_relative = 1e-2);
     drive(&mut careful, |_| 0.8, 0.0, 60.0);
     approx::assert_relative_eq!(careful.grip(), start, max_relative = 2e-2);
-    // A road that gives less is noticed before the assumed grip is driven with.
-    let mut slippery = driver(TireSet::start());
-    let worst_m = drive(&mut slippery, |_| 0.35, 0.0, 25.0);
-    assert!(slippery.grip() < 0.42 && worst_m < 0.4, "grip {}, {worst_m} m", slippery.grip());
+    // Roads that give less are noticed before the assumed grip is driven with. A slide may end anywhere: most do on the track.
+    let mut worst_m = Vec::new();
+    for k in 0..15 {
+        let road = 0.30 + 0.01 * f64::from(k);
+        let mut slippery = driver(TireSet::start());
+        worst_m.push(drive(&mut slippery, |_| road, 0.0, 25.0));
+        assert!(slippery.grip() < 1.1 * road, "{road}: grip {}", slippery.grip());
+    }
+    worst_m.sort_by(f64::total_cmp);
+    assert!(worst_m[7] < 0.4, "{worst_m:?}");
 }
 
 #[test]
@@ -238,17 +243,21 @@ fn sets_are_taken_for_what_they_are_good_for() {
     drive(&mut within, |_| 0.8, 0.0, 60.0);
     within.take(set(0.48, Trust::AcceptedWithin)).unwrap();
     approx::assert_relative_eq!(within.grip(), settings.step * start, max_relative = 1e-2);
-    within.take(TireSet { likely_peak: Some(0.55), ..set(0.48, Trust::AcceptedWithin) }).unwrap();
+    within.take(TireSet { likely_peaks: Some([0.55; 2]), ..set(0.48, Trust::AcceptedWithin) }).unwrap();
     approx::assert_relative_eq!(within.grip(), 0.96 * 0.55, max_relative = 1e-2);
     // What the car has done is no less for a set from a drive that showed little.
     within.take(set(0.25, Trust::AcceptedWithin)).unwrap();
     approx::assert_relative_eq!(within.grip(), 1.05 * start, max_relative = 1e-2);
-    within.take(TireSet { likely_peak: Some(0.3), ..set(0.25, Trust::AcceptedWithin) }).unwrap();
+    within.take(TireSet { likely_peaks: Some([0.3; 2]), ..set(0.25, Trust::AcceptedWithin) }).unwrap();
     approx::assert_relative_eq!(within.grip(), start, max_relative = 1e-2);
 
     // A peak that was reached is known as well as an accepted one's.
     within
-        .take(TireSet { likely_peak: Some(0.55), peak_reached: true, ..set(0.48, Trust::AcceptedWithin) })
+        .take(TireSet {
+            likely_peaks: Some([0.55; 2]),
+            peak_reached: true,
+            ..set(0.48, Trust::AcceptedWithin)
+        })
         .unwrap();
     approx::assert_relative_eq!(within.grip(), settings.share * 0.55, max_relative = 1e-2);
 
@@ -266,7 +275,7 @@ fn sets_are_taken_for_what_they_are_good_for() {
 fn a_set_that_promises_little_makes_nobody_slower_than_none() {
     let mut driver = driver(TireSet::start());
     drive(&mut driver, |_| 0.8, 0.0, 2.0);
-    let little = TireSet { likely_peak: Some(0.3), ..set(0.2, Trust::AcceptedWithin) };
+    let little = TireSet { likely_peaks: Some([0.3; 2]), ..set(0.2, Trust::AcceptedWithin) };
     driver.take(little).unwrap();
     let before = driver.grip();
     drive(&mut driver, |_| 0.8, 0.0, 20.0);
