@@ -2,8 +2,10 @@
 //!
 //! ```text
 //! given_f     (l_r (mean(v_x w) + slope(v_y)) + I_z/m slope(w))/(l_r cos d)    over the last 0.2 s, front axle; the rear one with l_f and -I_z
-//! promised_f  mean(g n_f(alpha_f))                                            at the slips of the same time, on the planned tires
+//! promised_f  mean(g n_f(alpha_f)) (1 + gain) sqrt(1 - (a_x share/((1 + gain) D g))^2)     at the slips of the same time, on the planned tires
 //! ```
+//!
+//! with the axle's gain of load, -m a_x h/(L F_z), and its share of what drives or brakes the car.
 //!
 //! Each axle is judged alone, and the car as a whole, more strictly: a car that pushes over its front wheels has most of its rear grip left.
 //! Where the plan's tires are far into their slip and an axle pushes much less than they say, the grip is what was given. It is the rule by which
@@ -208,4 +210,50 @@ impl Governor {
 fn stiffened(tires: &PacejkaParameters, by: f64) -> PacejkaParameters {
     let axle = |t: &MagicFormula| MagicFormula::from_stiffness(by * t.normalized_stiffness(), t.c, t.d, t.e);
     PacejkaParameters { front: axle(&tires.front), rear: axle(&tires.rear) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SPEED_MPS: f64 = 6.0;
+
+    /// Seconds until the grip is found to be less, on a road that gives a share of what the tires promise at their peak, and what it is found to be.
+    fn notices(share: impl Fn(f64) -> f64, a_x_mps2: f64, assumed: bool) -> Option<(f64, f64)> {
+        let vehicle = VehicleParameters::f1tenth();
+        let axle = MagicFormula::from_stiffness(9.0, 1.5, 0.8, 0.0);
+        let tires = PacejkaParameters { front: axle, rear: axle };
+        let slip_rad = axle.peak_slip_rad()?;
+        let mut governor = Governor::default();
+        (0..100).find_map(|k| {
+            let stamp_s = 0.01 * f64::from(k);
+            let v_x_mps = SPEED_MPS + a_x_mps2 * stamp_s;
+            let yaw_rate_radps = share(stamp_s) * 0.8 * GRAVITY_MPS2 / v_x_mps;
+            let v_y_mps = vehicle.l_r_m * yaw_rate_radps - v_x_mps * slip_rad.tan();
+            let ahead_rad = (v_y_mps + vehicle.l_f_m * yaw_rate_radps).atan2(v_x_mps);
+            let state =
+                CarState { stamp_s, v_x_mps, v_y_mps, yaw_rate_radps, x_m: 0.0, y_m: 0.0, heading_rad: 0.0 };
+            let look = governor.look(&state, ahead_rad + slip_rad, &vehicle, &tires, assumed)?;
+            look.given.map(|given| (stamp_s, given))
+        })
+    }
+
+    #[test]
+    fn the_more_is_missing_the_sooner_it_is_noticed_and_noise_is_not() {
+        assert_eq!(notices(|_| 0.95, 0.0, false), None);
+        let (soon_s, much) = notices(|_| 0.6, 0.0, false).unwrap();
+        let (later_s, little) = notices(|_| 0.84, 0.0, false).unwrap();
+        assert!(soon_s < 0.25 && later_s > soon_s + 0.1, "{soon_s} {later_s}");
+        assert!((0.47..0.53).contains(&much) && (0.66..0.72).contains(&little), "{much} {little}");
+        // A tenth of a second that reads less is no slide; on tires that nobody measured it is one.
+        let dip = |t: f64| if (0.5..0.7).contains(&t) { 0.82 } else { 0.95 };
+        assert_eq!(notices(dip, 0.0, false), None);
+        assert!(notices(dip, 0.0, true).is_some());
+    }
+
+    #[test]
+    fn what_brakes_pushes_less_to_the_side() {
+        assert!(notices(|_| 0.84, 0.0, false).is_some());
+        assert_eq!(notices(|_| 0.84, -3.0, false), None);
+    }
 }
