@@ -2,10 +2,10 @@
 //!
 //! ```text
 //! given_f     (l_r (mean(v_x w) + slope(v_y)) + I_z/m slope(w))/(l_r cos d)    over the last 0.2 s, front axle; the rear one with l_f and -I_z
-//! promised_f  mean(g n_f(alpha_f)) (1 + gain) sqrt(1 - (a_x share/((1 + gain) D g))^2)     at the slips of the same time, on the planned tires
+//! promised_f  mean(g n_f(alpha_f)) lateral_f                                  at the slips of the same time, on the planned tires
 //! ```
 //!
-//! with the axle's gain of load, -m a_x h/(L F_z), and its share of what drives or brakes the car.
+//! lateral_f: what the friction ellipse leaves beside drive and brakes.
 //!
 //! Each axle is judged alone, and the car as a whole, more strictly: a car that pushes over its front wheels has most of its rear grip left.
 //! Where the plan's tires are far into their slip and an axle pushes much less than they say, the grip is what was given. It is the rule by which
@@ -17,7 +17,7 @@
 use std::collections::VecDeque;
 
 use gripsight_vehicle::{
-    GRAVITY_MPS2, Input, MagicFormula, PacejkaParameters, SingleTrack, State, VehicleParameters,
+    AxleEllipse, GRAVITY_MPS2, Input, MagicFormula, PacejkaParameters, SingleTrack, State, VehicleParameters,
 };
 
 use crate::CarState;
@@ -59,6 +59,7 @@ struct Seen {
     yaw_rate_radps: f64,
     turned_mps2: f64,
     cos: f64,
+    sin: f64,
     /// Of each axle, over the mass that it carries.
     promised_mps2: [f64; 2],
     /// The same on the tires as they were assumed.
@@ -74,7 +75,7 @@ struct Look {
     left: f64,
     along: f64,
     /// Load over that of the car at rest.
-    gain: f64,
+    load: f64,
     /// Share of the promise that is enough.
     enough: f64,
 }
@@ -133,6 +134,7 @@ impl Governor {
             yaw_rate_radps: state.yaw_rate_radps,
             turned_mps2: state.v_x_mps * state.yaw_rate_radps,
             cos: steering_rad.cos(),
+            sin: steering_rad.sin(),
             promised_mps2,
             assumed_mps2,
         });
@@ -156,41 +158,36 @@ impl Governor {
             (sideways + turning / vehicle.l_r_m) / mean(0, n, &|s| s.cos).max(0.5),
             sideways - turning / vehicle.l_f_m,
         ];
-        // What drives or brakes each axle, over the mass that it carries, and what its load gains by that.
-        let a_x = slope(&|s| s.v_x_mps) - mean(0, n, &|s| s.v_y_mps * s.yaw_rate_radps);
-        let front = if a_x > 0.0 { vehicle.front_drive_share() } else { vehicle.front_brake_share() };
+        // Drive and brakes: beside them the car's turning and the steered wheels change v_x.
+        let scrubs = vehicle.l_r_m / vehicle.wheelbase_m() * given[0] * mean(0, n, &|s| s.sin);
+        let a_x = slope(&|s| s.v_x_mps) - mean(0, n, &|s| s.v_y_mps * s.yaw_rate_radps) + scrubs;
+        let ellipse = vehicle.friction_ellipse(a_x, most);
         let weight_n = loads[0] + loads[1];
-        let along = [front * a_x * weight_n / loads[0], (1.0 - front) * a_x * weight_n / loads[1]];
-        let moved_n = vehicle.mass_kg * a_x * vehicle.h_cg_m / vehicle.wheelbase_m();
-        let gains = [1.0 - moved_n / loads[0], 1.0 + moved_n / loads[1]].map(|gain| gain.max(0.1));
-        // Tires that also drive or brake push less to the side.
-        let beside = |along: f64, gain: f64| (1.0 - (along / (gain * most)).powi(2)).max(0.1).sqrt();
+        let left = (1.0 - (a_x / most).powi(2)).max(0.1).sqrt();
         let mut looks = Vec::with_capacity(3);
-        let mut both =
-            Look { left: beside(a_x, 1.0), along: a_x, gain: 1.0, enough: GIVEN, ..Look::default() };
+        let mut both = Look { left, along: a_x, load: 1.0, enough: GIVEN, ..Look::default() };
         for (axle, given) in given.into_iter().enumerate() {
             let alone = mean(0, n, &|s| s.assumed_mps2[axle]);
             if assumed && STIFFNESS_SHOWS.contains(&(alone.abs() / most)) {
                 let (both, square) = self.stiffness;
                 self.stiffness = (FORGETS * both + given * alone, FORGETS * square + alone * alone);
             }
-            let gain = gains[axle];
-            let left = gain * beside(along[axle], gain);
+            let AxleEllipse { along_mps2: along, load, lateral: left } = ellipse[axle];
             let promised = left * mean(0, n, &|s| s.promised_mps2[axle]);
             both.given += loads[axle] / weight_n * given;
             both.promised += loads[axle] / weight_n * promised;
-            looks.push(Look { given, promised, left, along: along[axle], gain, enough: GIVEN_AXLE });
+            looks.push(Look { given, promised, left, along, load, enough: GIVEN_AXLE });
         }
         looks.push(both);
         let mut road: Option<f64> = None;
         // Share of what is enough that is missing most; negative where all is there.
         let mut missing = f64::NEG_INFINITY;
-        for Look { given, promised, left, along, gain, enough } in looks {
+        for Look { given, promised, left, along, load, enough } in looks {
             let share = given / promised;
             if promised.abs() > ASKED * most * left {
                 missing = missing.max(enough - share);
                 if share < enough {
-                    let grip = (share.max(0.2) * promised).hypot(along) / (gain * GRAVITY_MPS2);
+                    let grip = (share.max(0.2) * promised).hypot(along) / (load * GRAVITY_MPS2);
                     road = Some(road.map_or(grip, |other| other.min(grip)));
                 }
             }

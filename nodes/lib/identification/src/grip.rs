@@ -1,13 +1,13 @@
 //! Whether the car still grips as the set in use promises, sample by sample: a fall of grip is told within a second of the first corner that shows it.
 //!
 //! ```text
-//! promised   P = mean over the last 0.5 s of (F_yf cos d + F_yr)/m at the slips driven, by the set in use
+//! promised   P = mean over the last 0.5 s of (e_f F_yf cos d + e_r F_yr)/m at the slips driven, by the set in use; e: what the friction ellipse leaves
+//!            beside the drive and the brakes of that time
 //! given      G = mean of v_x w, and what v_y has changed by over that time
 //! fallen     where P asks for half of what the set promises at most, and G/P stays below 1 - FALL
 //! ```
 //!
-//! The set promises no more than was shown, so that G/P lies about or above one. What the tires give beside braking, and slip that lags, is why a
-//! smaller fall is left to the [`Monitor`](crate::Monitor), which looks at whole windows.
+//! The set promises no more than was shown, so that G/P lies about or above one. Slip that lags is why a smaller fall is left to the [`Monitor`](crate::Monitor), which looks at whole windows.
 
 use std::collections::VecDeque;
 
@@ -60,9 +60,13 @@ pub struct GripWatch {
 #[derive(Debug, Clone, Copy)]
 struct Seen {
     stamp_ns: i64,
+    v_x_mps: f64,
     v_y_mps: f64,
     turned_mps2: f64,
-    promised_mps2: f64,
+    /// What the car's turning and the steered wheels add to the change of v_x, beside drive and brakes.
+    carried_mps2: f64,
+    /// Front, rear.
+    promised_mps2: [f64; 2],
 }
 
 impl GripWatch {
@@ -119,9 +123,12 @@ impl GripWatch {
         ];
         self.recent.push_back(Seen {
             stamp_ns,
+            v_x_mps: input.v_x_mps,
             v_y_mps: state.v_y_mps,
             turned_mps2: input.v_x_mps * state.yaw_rate_radps,
-            promised_mps2: (front_n * input.steering_rad.cos() + rear_n) / self.vehicle.mass_kg,
+            carried_mps2: state.v_y_mps * state.yaw_rate_radps
+                - front_n * input.steering_rad.sin() / self.vehicle.mass_kg,
+            promised_mps2: [front_n * input.steering_rad.cos(), rear_n].map(|n| n / self.vehicle.mass_kg),
         });
         let from_ns = stamp_ns - (LOOK_S * NS_PER_S) as i64;
         if self.recent.front().is_none_or(|first| first.stamp_ns > from_ns) {
@@ -147,10 +154,15 @@ impl GripWatch {
         let late_s = self.recent.range(n - end..).map(stamp_s).sum::<f64>() / end as f64;
         let early_s = self.recent.range(..end).map(stamp_s).sum::<f64>() / end as f64;
         let apart_s = late_s - early_s;
-        let slid = (mean(n - end, n, |s| s.v_y_mps) - mean(0, end, |s| s.v_y_mps)) / apart_s.max(1e-3);
-        let given = mean(0, n, |s| s.turned_mps2) + slid;
-        let promised_mps2 = mean(0, n, |s| s.promised_mps2);
+        let slope = |of: fn(&Seen) -> f64| (mean(n - end, n, of) - mean(0, end, of)) / apart_s.max(1e-3);
+        let given = mean(0, n, |s| s.turned_mps2) + slope(|s| s.v_y_mps);
+        let along = slope(|s| s.v_x_mps) - mean(0, n, |s| s.carried_mps2);
         let most = GRAVITY_MPS2 * self.set.promised.front.d.min(self.set.promised.rear.d);
+        // The ellipse is that of the tires found: a promise is a lower bound, and takes nothing from what brakes.
+        let found = GRAVITY_MPS2 * self.set.phi_p.front.d.min(self.set.phi_p.rear.d);
+        let [front, rear] = self.vehicle.friction_ellipse(along, found).map(|axle| axle.lateral);
+        let promised_mps2 =
+            front * mean(0, n, |s| s.promised_mps2[0]) + rear * mean(0, n, |s| s.promised_mps2[1]);
         let asked = promised_mps2.abs() > ASKED * most;
         let share = if asked { given / promised_mps2 } else { f64::NAN };
         self.low = if share < 1.0 - FALL { self.low + 1 } else { 0 };

@@ -3,6 +3,7 @@
 //! * [`MagicFormula`]: normalised lateral force of one axle's tires, F_y/F_z;
 //! * [`SingleTrack`]: the dynamic single-track model of the paper (arXiv 2603.09399, eq. 1-5);
 //! * [`VehicleParameters`]: what is known of the car, read from a ROS 2 parameter file;
+//! * [`AxleEllipse`]: what an axle has left for the side while it drives or brakes;
 //! * [`PacejkaParameters`]: Phi_p, the effective tires of this model; [`OwnTires`]: those of the car with its load transfer and combined slip;
 //! * [`TirePosterior`]: own tires as a drive knows them;
 //! * [`handling`]: numbers that an engineer knows: cornering stiffness, understeer gradient, stability.
@@ -12,6 +13,7 @@
 //! Signs follow REP-103: left steer, left yaw and left force are positive; a positive slip angle makes a force to the left.
 
 mod curve_fit;
+mod ellipse;
 mod error;
 pub mod handling;
 mod magic_formula;
@@ -21,6 +23,7 @@ mod real;
 mod single_track;
 mod tire_posterior;
 
+pub use ellipse::AxleEllipse;
 pub use error::VehicleError;
 pub use magic_formula::{MagicFormula, PacejkaParameters};
 pub use own_tires::{OWN_TIRE_PARAMETERS, OwnTires};
