@@ -4,6 +4,9 @@ use std::collections::VecDeque;
 
 use gripsight_vehicle::{Input, PacejkaParameters, SingleTrack, State, VehicleParameters};
 
+/// Slower than this the slip angles of a measured state are noise.
+const SLOW_MPS: f64 = 1.0;
+
 /// What odometry says of the car.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CarState {
@@ -31,9 +34,9 @@ impl CarState {
         [stamp_s, x_m, y_m, heading_rad, v_x_mps, v_y_mps, yaw_rate_radps].iter().all(|v| v.is_finite())
     }
 
-    /// Direction of travel.
+    /// Direction of travel; of a car that hardly moves, whose v_y is noise, about its heading.
     pub(crate) fn course_rad(&self) -> f64 {
-        self.heading_rad + self.v_y_mps.atan2(self.v_x_mps.max(0.1))
+        self.heading_rad + self.v_y_mps.atan2(self.v_x_mps.max(SLOW_MPS))
     }
 }
 

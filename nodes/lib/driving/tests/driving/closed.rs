@@ -305,6 +305,20 @@ fn a_warning_slows_at_once_and_a_known_peak_ends_it() {
 }
 
 #[test]
+fn a_car_that_starts_does_not_steer_by_its_noise() {
+    let mut driver = driver(TireSet::start());
+    let mut asked = Vec::new();
+    for k in 0..100 {
+        let stamp_s = 0.01 * f64::from(k);
+        let noise = if k % 2 == 0 { 0.02 } else { -0.02 };
+        let car = on_the_line(&driver, 0.0, 0.01 * f64::from(k));
+        asked.push(driver.command(&CarState { stamp_s, v_y_mps: noise, ..car }, stamp_s).steering_rad);
+    }
+    let most = asked.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+    assert!(most < 0.1, "the steering jumps by {most} rad");
+}
+
+#[test]
 fn nonsense_changes_nothing() {
     let mut driver = driver(set(0.8, Trust::Accepted));
     let grip = driver.grip();
