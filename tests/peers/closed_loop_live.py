@@ -174,6 +174,8 @@ def main():
     args.out.mkdir(parents=True, exist_ok=True)
     laps, nodes = read(args.out / "laps.csv"), read(args.out / "nodes.csv")
     short = False
+    # What was started is stopped, however this ends.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     for car in args.cars:
         for variant in args.variants:
             if any((row["car"], row["variant"]) == (car, variant) for row in laps):

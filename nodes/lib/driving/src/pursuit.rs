@@ -12,6 +12,8 @@ use crate::steering::{Moment, NoAngle, PROMPT_S, Steering};
 
 /// Gain k of the yaw rate, over what the geometry of a rolling car gives.
 const YAW_GAIN: f64 = 1.5;
+/// Speed up to which both terms fade out: a car that hardly rolls goes where its wheels point, and swings where its yaw is corrected late.
+const ROLLS_MPS: f64 = 2.5;
 /// Time T of the trim.
 const TRIM_S: f64 = 0.1;
 /// Share of the largest planned acceleration from which the trim does not grow.
@@ -63,7 +65,7 @@ impl Pursuing {
         let most = table.most_mps2();
         let a = wanted.clamp(-most, most);
         let late_radps = a / speed - car.yaw_rate_radps;
-        let late_rad = wheelbase_m / speed.max(1.0) * late_radps;
+        let late_rad = (speed / ROLLS_MPS).min(1.0) * wheelbase_m / speed.max(1.0) * late_radps;
         let grows = late_rad * self.trim_rad > 0.0 && late_rad * a > 0.0;
         if at.assumed || wanted.abs() < TRIM_UP_TO * most || !grows {
             self.trim_rad += at.dt_s().clamp(0.0, 0.05) / TRIM_S * (late_rad - 0.2 * self.trim_rad);
