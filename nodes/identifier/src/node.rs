@@ -272,12 +272,12 @@ async fn hand_on(
 ) {
     let replaces = outcome.replaces(in_force.borrow().as_ref().filter(|i| !i.withdrawn).map(|i| &i.set));
     if let Some(set) = outcome.accepted_set().filter(|_| replaces) {
-        let sent = messages::provisional(outcome)
-            .filter(|_| provisional)
-            .map(|set| PacejkaParams { header: message.header.clone(), ..set })
-            .unwrap_or(message);
-        outputs.publish(&sent).await;
-        *in_force.borrow_mut() = Some(InForce { set, message: sent, withdrawn: false });
+        outputs.publish(&message).await;
+        // Who takes the prior's peak also needs what the drive alone shows: it goes first, so that who comes late finds the prior's.
+        if let Some(beside) = messages::provisional(outcome).filter(|_| provisional) {
+            outputs.publish(&PacejkaParams { header: message.header.clone(), ..beside }).await;
+        }
+        *in_force.borrow_mut() = Some(InForce { set, message, withdrawn: false });
         return;
     }
     if provisional && outcome.status == Status::Provisional {
