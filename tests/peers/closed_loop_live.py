@@ -93,8 +93,10 @@ def drive(args, car, variant):
         {"car": car, "variant": variant, "lap": int(n), "time_s": float(t), "error_m": float(mean), "worst_m": float(worst), "exits": int(exits), "grip": float(grip), "rests_on": on, "state_ms": int(age)}
         for n, t, mean, worst, exits, grip, on, age in LAP.findall(text)[: args.laps]
     ]
+    # A node of the run before may still be ending when this one's begins: its time goes back then.
+    share = lambda seen: sum(max(0.0, b[1] - a[1]) for a, b in zip(seen, seen[1:])) / max(seen[-1][0] - seen[0][0], 1e-3)
     nodes = [
-        {"car": car, "variant": variant, "node": name, "processor": round((seen[-1][1] - seen[0][1]) / max(seen[-1][0] - seen[0][0], 1e-3), 4), "most_mb": round(max(row[2] for row in seen), 1)}
+        {"car": car, "variant": variant, "node": name, "processor": round(share(seen), 4), "most_mb": round(max(row[2] for row in seen), 1)}
         for name, seen in used.items()
     ]
     return laps, nodes
