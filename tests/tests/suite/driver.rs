@@ -17,13 +17,14 @@ const LAPS: Duration = Duration::from_secs(120);
 
 /// Publishes a set as the identifier would.
 fn publish(domain: &Domain, python: &Path, hash: &str, status: u8) {
-    // The plant's on a road of 0.9, projected on Phi_p.
+    // The plant's on a road of 0.9, projected on Phi_p; its front axle gives way at this slip.
     let front = json!({"b": 9.68, "c": 1.041, "d": 0.830, "e": -0.876});
     let rear = json!({"b": 11.72, "c": 1.0, "d": 0.857, "e": -0.738});
-    let peak = json!({"friction": {"value": 0.83, "low": 0.8, "high": 0.86}, "reached": true});
+    let peak = |peak: f64| json!({"friction": {"value": peak, "low": 0.98 * peak, "high": 1.02 * peak}, "reached": true});
     let set = json!({
         "handshake": {"vehicle_hash": hash, "sequence_id": 7}, "status": status, "reason": "as a peer says",
-        "front": front, "rear": rear, "front_peak": peak, "rear_peak": peak, "signals": {"steering_gain": 1.0}
+        "front": front, "rear": rear, "front_peak": peak(0.806), "rear_peak": peak(0.857), "front_valid_slip_rad": 0.231,
+        "signals": {"steering_gain": 1.0}
     });
     let mut peer =
         start_cyclone(domain, python, &["publish", "/identifier/pacejka", SET, "--qos", "latched"]);
@@ -96,7 +97,7 @@ fn the_driver_laps_the_live_car_takes_a_set_and_slows_when_it_is_withdrawn() {
     publish(&domain, &python, "of another car", PacejkaParams::ACCEPTED);
     driver.wait_for_log("of a car with other parameters", PATIENCE);
     publish(&domain, &python, &hash, PacejkaParams::ACCEPTED);
-    driver.wait_for_log("Accepted: planning with a grip of 0.8", PATIENCE);
+    driver.wait_for_log("Accepted: planning with a grip of 0.79", PATIENCE);
     lap(&driver);
     let fast = lap(&driver);
     assert!(fast.time_s < 0.9 * slow.time_s, "{} s after {} s", fast.time_s, slow.time_s);
@@ -107,10 +108,10 @@ fn the_driver_laps_the_live_car_takes_a_set_and_slows_when_it_is_withdrawn() {
 
     let told = Instant::now();
     warn(&domain, &python, &hash, 6);
-    driver.wait_for_log("planning with a grip of 0.47", PATIENCE);
+    driver.wait_for_log("planning with a grip of 0.46", PATIENCE);
     assert!(told.elapsed() < Duration::from_secs(3), "{:?} with the peer's own start", told.elapsed());
     publish(&domain, &python, &hash, PacejkaParams::ACCEPTED);
-    driver.wait_for_log("Accepted: planning with a grip of 0.8", PATIENCE);
+    driver.wait_for_log("Accepted: planning with a grip of 0.79", PATIENCE);
 
     let told = Instant::now();
     publish(&domain, &python, &hash, PacejkaParams::WITHDRAWN);
