@@ -21,7 +21,7 @@ import sys
 import time
 
 import yaml
-from soak import processes
+from soak import processes, stop
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 # What a prior is off by; None: no prior, and "none" has no suite at all.
@@ -31,16 +31,6 @@ LAP = re.compile(r"lap (\d+): ([\d.]+) s, to the line ([\d.]+) m, at most ([\d.]
 READY_S = 20.0
 # No car here takes so long for a lap.
 LONGEST_LAP_S = 150.0
-
-
-def stop(started):
-    for process in reversed(started):
-        process.send_signal(signal.SIGINT)
-    for process in started:
-        try:
-            process.wait(10)
-        except subprocess.TimeoutExpired:
-            process.kill()
 
 
 def parameters(folder):

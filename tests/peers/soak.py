@@ -54,6 +54,17 @@ def processes():
     return found
 
 
+def stop(started):
+    """Ends processes, the last one first."""
+    for process in reversed(started):
+        process.send_signal(signal.SIGINT)
+    for process in started:
+        try:
+            process.wait(10)
+        except subprocess.TimeoutExpired:
+            process.kill()
+
+
 def growth(times, values):
     """By the hour, in the second half: the slope of a line, with the half width of its 90 % interval."""
     half = times >= 0.5 * times[-1]
@@ -188,13 +199,7 @@ def main():
             index += 1
             time.sleep(max(0.0, begun + index * EVERY_S - time.monotonic()))
     finally:
-        for process in reversed(started):
-            process.send_signal(signal.SIGINT)
-        for process in started:
-            try:
-                process.wait(10)
-            except subprocess.TimeoutExpired:
-                process.kill()
+        stop(started)
     observer.running = False
     for name, content in (("nodes.csv", rows), ("latency.csv", latencies)):
         with (args.out / name).open("w", newline="") as file:

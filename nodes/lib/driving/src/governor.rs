@@ -33,8 +33,8 @@ const GIVEN_AXLE: f64 = 0.7;
 /// What must be missing beyond that, share times seconds: looks overlap, and their noise lasts as long as they do. A fifth less shows after 40 ms, a few
 /// hundredths less after a fifth of a second (Page's cumulative sum).
 const MISSING_S: f64 = 0.008;
-/// The same on tires that nobody measured, which promise too much far more often.
-const MISSING_ASSUMED_S: f64 = 0.001;
+/// The same on tires that nobody measured, which promise too much far more often: a hundredth less over 40 ms.
+const MISSING_ASSUMED_S: f64 = 0.0004;
 /// Shares of the planned grip between which the stiffness shows.
 const STIFFNESS_SHOWS: std::ops::Range<f64> = 0.06..0.25;
 /// What a look less counts than the next, for the stiffness.
