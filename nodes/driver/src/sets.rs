@@ -29,15 +29,14 @@ pub(crate) fn read(message: &PacejkaParams, vehicle_hash: &str, provisional: boo
         _ => return Said::Nothing("neither accepted nor withdrawn"),
     };
     let (front, rear) = (&message.front_peak, &message.rear_peak);
-    let weaker = if front.friction.value < rear.friction.value { front } else { rear };
+    let peaks = [front.friction.value, rear.friction.value];
     let signals = &message.signals;
     Said::Set(TireSet {
         tires: PacejkaParameters { front: formula(&message.front), rear: formula(&message.rear) },
         trust,
         valid_slip_rad: [message.front_valid_slip_rad, message.rear_valid_slip_rad],
-        likely_peaks: Some([front.friction.value, rear.friction.value])
-            .filter(|peaks| peaks.iter().all(|peak| peak.is_finite() && *peak > 0.0)),
-        peak_reached: weaker.reached,
+        likely_peaks: Some(peaks).filter(|peaks| peaks.iter().all(|peak| peak.is_finite() && *peak > 0.0)),
+        peak_reached: TireSet::limit_reached(peaks, [front.reached, rear.reached]),
         actuator: Actuator {
             delay_s: signals.steering_delay_s.max(0.0),
             gain: signals.steering_gain,

@@ -34,6 +34,12 @@ impl CarState {
         [stamp_s, x_m, y_m, heading_rad, v_x_mps, v_y_mps, yaw_rate_radps].iter().all(|v| v.is_finite())
     }
 
+    /// Slip angle of the rear axle.
+    pub(crate) fn rear_slip_rad(&self, vehicle: &VehicleParameters) -> f64 {
+        let behind_mps = vehicle.l_r_m * self.yaw_rate_radps - self.v_y_mps;
+        behind_mps.atan2(self.v_x_mps.max(SLOW_MPS))
+    }
+
     /// Direction of travel; of a car that hardly moves, whose v_y is noise, about its heading.
     pub(crate) fn course_rad(&self) -> f64 {
         self.heading_rad + self.v_y_mps.atan2(self.v_x_mps.max(SLOW_MPS))

@@ -109,11 +109,16 @@ impl Moment<'_> {
         wheels_rad(self.asked, self.now.stamp_s, self.delay_s, self.lag_s)
     }
 
-    /// An angle with no more slip at the front wheels than has a use: more than that of the largest force only scrubs.
+    /// An angle with no more slip at the front wheels than has a use: more than that of the largest force only scrubs, and where the car swings out its
+    /// front wheels go with its travel, or it turns further.
     pub(crate) fn within_slip(&self, car: &CarState, angle_rad: f64) -> f64 {
         let ahead = car.v_y_mps + self.vehicle.l_f_m * car.yaw_rate_radps;
         let front_rad = ahead.atan2(car.v_x_mps.max(0.1));
         let slip_rad = MOST_SLIP * self.plan.table.front_slip_rad();
-        angle_rad.clamp(front_rad - slip_rad, front_rad + slip_rad)
+        let rear_rad = car.rear_slip_rad(self.vehicle);
+        let turning_mps2 = car.v_x_mps * car.yaw_rate_radps;
+        let left_rad = slip_rad * (1.0 - self.plan.table.swings(rear_rad, turning_mps2));
+        let [right, left] = if rear_rad > 0.0 { [slip_rad, left_rad] } else { [left_rad, slip_rad] };
+        angle_rad.clamp(front_rad - right, front_rad + left)
     }
 }

@@ -24,12 +24,20 @@ use crate::DrivingError;
 /// No tire's peak lies at more than this many times the slip at which its stiffness alone would give that force: Magic Formulas with C of 1.25 and more, as
 /// tires have, peak before.
 const LATEST: f64 = 4.0;
+/// Rear slip, over that at which the stiffness alone would give the largest force, from which the axle slides, and from which wholly. Magic Formulas with C
+/// of 1.3 and more peak below 3.5; the curve of a set says less, as it ends with what was shown.
+const REAR_SLIDES: [f64; 2] = [3.5, 5.5];
+/// v_x times yaw rate, over the largest lateral acceleration, from which the slip of a sliding car grows, and from which fast.
+const OVERTURNS: [f64; 2] = [1.1, 1.5];
 /// Rows of the slip table.
 const ROWS: usize = 200;
 /// Share of the largest force that the table goes up to: at the peak itself the slip is not defined.
 const MOST: f64 = 0.995;
 /// Forces of the front axle that the largest turn is searched over.
 const STEPS: usize = 50;
+
+/// Peak of an axle over that of the weaker one, up to which it limits the car as well: likely peaks are known to about a tenth.
+const AS_WEAK: f64 = 1.05;
 
 /// What a set may be used for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -74,7 +82,7 @@ pub struct TireSet {
     pub valid_slip_rad: [f64; 2],
     /// Most likely peaks over the load, front and rear, where somebody says; the set itself may promise less, of one axle more so than of the other.
     pub likely_peaks: Option<[f64; 2]>,
-    /// Whether the data reach that of the weaker axle.
+    /// Whether the data reach what limits the car: [`TireSet::limit_reached`].
     pub peak_reached: bool,
     /// The steering actuator as identified with them.
     pub actuator: Actuator,
@@ -117,6 +125,13 @@ impl TireSet {
         axle(&self.tires.front, self.valid_slip_rad[0]).min(axle(&self.tires.rear, self.valid_slip_rad[1]))
     }
 
+    /// Whether it is known what the car turns with: the peak of the weaker axle was reached, or one of the other that is hardly higher.
+    #[must_use]
+    pub fn limit_reached(likely_peaks: [f64; 2], reached: [bool; 2]) -> bool {
+        let weaker = likely_peaks[0].min(likely_peaks[1]);
+        likely_peaks.iter().zip(reached).any(|(peak, reached)| reached && *peak <= AS_WEAK * weaker)
+    }
+
     /// Checks that the set can be driven on.
     ///
     /// # Errors
@@ -157,17 +172,20 @@ pub struct SteeringTable {
 #[derive(Debug, Clone, PartialEq)]
 struct Column {
     most: f64,
+    /// Slip at which the stiffness alone would give the largest force.
+    stiff_rad: f64,
     slips_rad: Vec<f64>,
 }
 
 impl Column {
     fn new(tire: &MagicFormula) -> Self {
         // A curve that rises for ever has no peak, and gives the last hundredth of its force at any slip.
-        let latest_rad = LATEST * tire.d / tire.normalized_stiffness();
+        let stiff_rad = tire.d / tire.normalized_stiffness();
+        let latest_rad = LATEST * stiff_rad;
         let peak_rad = tire.peak_slip_rad().map_or(latest_rad, |peak| peak.min(latest_rad));
         let most = MOST * tire.normalized_force(peak_rad).max(1e-3);
         let share = |k: usize| most * k as f64 / (ROWS - 1) as f64;
-        Self { most, slips_rad: (0..ROWS).map(|k| slip_of(tire, share(k), peak_rad)).collect() }
+        Self { most, stiff_rad, slips_rad: (0..ROWS).map(|k| slip_of(tire, share(k), peak_rad)).collect() }
     }
 
     fn slip_rad(&self, over_g: f64) -> f64 {
@@ -227,6 +245,17 @@ impl SteeringTable {
         self.front.slip_rad(self.front.most)
     }
 
+    /// How far the car swings out, from its rear slip and v_x times its yaw rate: 0 not at all, 1 wholly. It does where the rear axle slides and the car
+    /// turns faster than any force of its tires turns its way, so that the slip grows.
+    #[must_use]
+    pub(crate) fn swings(&self, rear_slip_rad: f64, turning_mps2: f64) -> f64 {
+        let within =
+            |value: f64, [from, wholly]: [f64; 2]| ((value - from) / (wholly - from)).clamp(0.0, 1.0);
+        let slides = within(rear_slip_rad.abs() / self.rear.stiff_rad, REAR_SLIDES);
+        let turns = if rear_slip_rad * turning_mps2 > 0.0 { turning_mps2.abs() } else { 0.0 };
+        slides * within(turns / self.most_mps2(), OVERTURNS)
+    }
+
     /// Largest lateral acceleration over g of a steady turn at a curvature, the weaker axle pushing `grip` over its load at most: front wheels push
     /// square to themselves, so that some of it goes backward in a tight turn, the more the further they are steered into their slip.
     #[must_use]
@@ -260,6 +289,14 @@ fn slip_of(tire: &MagicFormula, force: f64, peak_rad: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_axle_that_gave_all_it_has_limits_the_car() {
+        assert!(TireSet::limit_reached([0.38, 0.5], [true, false]));
+        assert!(TireSet::limit_reached([0.38, 0.37], [true, false]));
+        assert!(!TireSet::limit_reached([0.5, 0.37], [true, false]));
+        assert!(!TireSet::limit_reached([0.38, 0.37], [false; 2]));
+    }
 
     #[test]
     fn limits_of_a_set_hold_its_grip() {
@@ -305,6 +342,27 @@ mod tests {
         let strong = MagicFormula { d: 1.2 * tires.front.d, ..tires.front };
         let table = SteeringTable::new(&car, &PacejkaParameters { front: strong, ..tires });
         approx::assert_relative_eq!(table.turns(tight, 0.4), 0.4, max_relative = 1e-3);
+    }
+
+    #[test]
+    fn a_car_swings_out_where_its_slip_is_beyond_the_peak_and_grows() {
+        let tires = TireSet::start_at(0.8).tires;
+        let table = SteeringTable::new(&VehicleParameters::f1tenth(), &tires);
+        // Stiffness alone gives the peak at 0.133 rad.
+        let (within, beyond) = (0.4, 0.8);
+        let (steady, fast) = (table.most_mps2(), 1.6 * table.most_mps2());
+        approx::assert_relative_eq!(table.swings(beyond, fast), 1.0);
+        approx::assert_relative_eq!(table.swings(-beyond, -fast), 1.0);
+        for (slip_rad, turning_mps2) in [(within, fast), (beyond, steady), (beyond, -fast), (0.0, 0.0)] {
+            approx::assert_relative_eq!(table.swings(slip_rad, turning_mps2), 0.0);
+        }
+        let halfway = table.swings(4.5 * 0.8 / 6.0, fast);
+        assert!((0.45..0.55).contains(&halfway), "{halfway}");
+        // A promise that ends with what was shown is no peak: its curve bends at once.
+        let axle = MagicFormula { b: 8.0, c: 2.2, d: 0.3, e: -4.0 };
+        let table =
+            SteeringTable::new(&VehicleParameters::f1tenth(), &PacejkaParameters { front: axle, rear: axle });
+        approx::assert_relative_eq!(table.swings(2.0 * table.slips_rad(table.most_mps2()).1, fast), 0.0);
     }
 
     #[test]

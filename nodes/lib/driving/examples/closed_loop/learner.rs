@@ -171,7 +171,6 @@ fn take(
     let slip = &outcome.valid_within.slip_rad;
     let signals = &outcome.signals;
     let (front, rear) = (&outcome.peak_friction.front, &outcome.peak_friction.rear);
-    let weaker = if front.value < rear.value { front } else { rear };
     let set = TireSet {
         tires: *tires,
         trust,
@@ -181,7 +180,7 @@ fn take(
             [slip.front, slip.rear]
         },
         likely_peaks: Some([front.value, rear.value]),
-        peak_reached: weaker.reached,
+        peak_reached: TireSet::limit_reached([front.value, rear.value], [front.reached, rear.reached]),
         actuator: Actuator {
             delay_s: signals.steering_delay_s.max(0.0),
             gain: signals.steering_gain,

@@ -7,7 +7,7 @@ use crate::plan::Plan;
 use crate::state::{CarState, wheels_rad};
 use crate::tires::{TireSet, Trust};
 
-/// Share of the most likely peak to explore up to, where it was not reached.
+/// Share of the most likely peak to explore up to, where the set promises less.
 const LIKELY: f64 = 0.96;
 /// Grip planned over what half a lap was driven with without a slide, however little a set promises: from a drive that showed little the promise may be
 /// below what the car has done, and a plan held there would show no more.
@@ -91,7 +91,10 @@ impl Driver {
         let bold = (step * driven).min(most);
         let alone = match base.trust {
             Trust::Assumed => careful.max(self.driven).min(share * shown),
-            Trust::Accepted => bold.min(share * likely_peak.unwrap_or(shown)).max(share * shown),
+            Trust::Accepted => {
+                let peak = LIKELY * likely_peak.unwrap_or(shown);
+                bold.min(peak.max(self.driven)).max(share * shown)
+            }
             Trust::AcceptedWithin => {
                 let peak = if base.peak_reached { share * likely } else { LIKELY * likely };
                 bold.min(peak.max(self.driven)).max(share * shown)

@@ -33,13 +33,17 @@ impl Driver {
         let resisted = slides + scrubs + limits.told.resistance_mps2(state.v_x_mps);
         let left = limits.left_beside(turned, point.curvature_1pm);
         let wanted = slope * room + resisted + self.settings.speed_gain_1ps * (speed_mps - state.v_x_mps);
-        let drive =
-            limits.drive_at_mps2(state.v_x_mps) * left.max(LEAST_DRIVE) * if wide > 0.0 { 0.5 } else { 1.0 };
+        // A tire that slides has no force to spare, and what drives or brakes it turns the car further.
+        let steady = 1.0 - self.plan.table.swings(state.rear_slip_rad(&self.vehicle), turned);
+        let drive = limits.drive_at_mps2(state.v_x_mps)
+            * left.max(LEAST_DRIVE)
+            * if wide > 0.0 { 0.5 } else { 1.0 }
+            * steady;
         // Whoever is too fast, or was too fast for a plan that was taken back, does not get around by steering: the brakes come first.
         let over = ((state.v_x_mps / speed_mps.max(0.1) - 1.0) / TOO_FAST).clamp(0.0, 1.0);
         let over = if self.held_back() { 1.0 } else { over };
         let least = LEAST_BRAKE[0] + (LEAST_BRAKE[1] - LEAST_BRAKE[0]) * over;
-        let brake = limits.brake_mps2 * left.max(least);
+        let brake = limits.brake_mps2 * left.max(least) * steady;
         (speed_mps, wanted.clamp(-brake, drive))
     }
 }
