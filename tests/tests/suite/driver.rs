@@ -97,7 +97,7 @@ fn the_driver_laps_the_live_car_takes_a_set_and_slows_when_it_is_withdrawn() {
     publish(&domain, &python, "of another car", PacejkaParams::ACCEPTED);
     driver.wait_for_log("of a car with other parameters", PATIENCE);
     publish(&domain, &python, &hash, PacejkaParams::ACCEPTED);
-    driver.wait_for_log("Accepted: planning with a grip of 0.79", PATIENCE);
+    driver.wait_for_log("Accepted: planning with a grip of 0.788", PATIENCE);
     lap(&driver);
     let fast = lap(&driver);
     assert!(fast.time_s < 0.9 * slow.time_s, "{} s after {} s", fast.time_s, slow.time_s);
@@ -111,7 +111,7 @@ fn the_driver_laps_the_live_car_takes_a_set_and_slows_when_it_is_withdrawn() {
     driver.wait_for_log("planning with a grip of 0.46", PATIENCE);
     assert!(told.elapsed() < Duration::from_secs(3), "{:?} with the peer's own start", told.elapsed());
     publish(&domain, &python, &hash, PacejkaParams::ACCEPTED);
-    driver.wait_for_log("Accepted: planning with a grip of 0.79", PATIENCE);
+    driver.wait_for_log("Accepted: planning with a grip of 0.788", PATIENCE);
 
     let told = Instant::now();
     publish(&domain, &python, &hash, PacejkaParams::WITHDRAWN);

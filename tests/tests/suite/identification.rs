@@ -176,6 +176,33 @@ fn the_live_phi_p_is_the_offline_one_bit_for_bit_at_1x_and_at_10x() {
 }
 
 #[test]
+fn who_takes_a_prior_s_peak_hears_first_what_the_drive_alone_shows() {
+    let Ok(python) = cyclone() else {
+        available(&[cyclone()]);
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    // Too gently driven for a peak.
+    let (bag, vehicle) = simulate(folder.path(), &["--duration", "32", "--seed", "11", "--pace", "0.6"]);
+    let domain = Domain::new();
+    let tires = listen(&domain, &python, "/identifier/pacejka", PacejkaParams::TYPE, "reliable", "2");
+    let [_telemetry, _residual, plain] = suite(&domain, &vehicle, "30.0");
+    drop(plain);
+    let _identifier = identifier(&domain, &vehicle, &["-p", "publish_provisional:=true"]);
+    tell_prior(&domain, &python);
+    let path = format!("bag:={}", bag.display());
+    let wait = "wait_for:=[/car_state/odom, /drive, /imu/data, /wheel_speeds]";
+    let _player = node(&domain, "bag_player", &["-p", &path, "-p", "rate:=10.0", "-p", wait]);
+
+    let shown: PacejkaParams = parsed(&tires.line(RUN));
+    assert_eq!(shown.status, PacejkaParams::ACCEPTED_WITHIN, "{}", shown.reason);
+    let prior: PacejkaParams = message(&tires);
+    assert_eq!(prior.status, PacejkaParams::PROVISIONAL, "{}", prior.reason);
+    assert_eq!(prior.handshake.sequence_id, shown.handshake.sequence_id);
+    assert!(prior.front.d > shown.front.d, "{} {}", prior.front.d, shown.front.d);
+}
+
+#[test]
 fn a_peer_gets_the_residual_of_every_sample_once_there_is_a_model() {
     let Ok(python) = cyclone() else {
         available(&[cyclone()]);

@@ -170,3 +170,76 @@ impl GripWatch {
         GripLook { stamp_ns, share, promised_mps2, fallen: self.low >= LOOKS }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use gripsight_signals::{DriveSample, OdometrySample};
+    use gripsight_vehicle::{MagicFormula, PacejkaParameters};
+
+    use super::*;
+    use crate::rollout::Nuisance;
+    use crate::{PerAxle, SignalCorrections, Status, ValidWithin};
+
+    const SPEED_MPS: f64 = 12.0;
+
+    fn both<T: Copy>(value: T) -> PerAxle<T> {
+        PerAxle { front: value, rear: value }
+    }
+
+    /// Seconds until a fall is told, where the road gives a share of the force that the set has at its peak, from a time on.
+    fn told_s(share: impl Fn(f64) -> f64, a_x_mps2: f64) -> Option<f64> {
+        let vehicle = VehicleParameters::f1tenth();
+        let axle = MagicFormula::from_stiffness(9.0, 1.5, 0.8, 0.0);
+        let tires = PacejkaParameters { front: axle, rear: axle };
+        let slip_rad = axle.peak_slip_rad()?;
+        let set = AcceptedSet {
+            vehicle_hash: vehicle_hash(&vehicle),
+            sequence_id: 1,
+            phi_p: tires,
+            promised: tires,
+            status: Status::Accepted,
+            valid_within: ValidWithin { slip_rad: both(slip_rad), force_n: both(10.0) },
+            corrections: SignalCorrections::NONE,
+            nuisance: Nuisance { relaxation_m: 0.0, combined_slip: 0.0, load_transfer: 0.0 },
+            rollout_rmse: [0.01; 2],
+            peak_reached: both(true),
+        };
+        let mut watch = GripWatch::new(&vehicle, &set).ok()?;
+        (0..200).find_map(|k| {
+            let now_s = 0.01 * f64::from(k);
+            let stamp_ns = (now_s * NS_PER_S) as i64;
+            let v_x_mps = SPEED_MPS + a_x_mps2 * now_s;
+            // At a constant slip v_y changes with v_x.
+            let turned_mps2 = share(now_s) * 0.8 * GRAVITY_MPS2 + a_x_mps2 * slip_rad.tan();
+            let yaw_rate_radps = turned_mps2 / v_x_mps;
+            let v_y_mps = vehicle.l_r_m * yaw_rate_radps - v_x_mps * slip_rad.tan();
+            let ahead_rad = (v_y_mps + vehicle.l_f_m * yaw_rate_radps).atan2(v_x_mps);
+            let sample = TelemetrySample {
+                odometry: OdometrySample { stamp_ns, v_x_mps, v_y_mps, yaw_rate_radps, ..Default::default() },
+                drive: DriveSample {
+                    stamp_ns,
+                    steering_angle_rad: ahead_rad + slip_rad,
+                    ..Default::default()
+                },
+                ..TelemetrySample::default()
+            };
+            watch.push(&sample).filter(|look| look.fallen).map(|_| now_s)
+        })
+    }
+
+    #[test]
+    fn a_fall_is_told_within_a_second_and_a_road_that_gives_what_is_promised_is_not() {
+        assert_eq!(told_s(|_| 0.9, 0.0), None);
+        let fallen_s = told_s(|t| if t < 1.0 { 0.95 } else { 0.65 }, 0.0).unwrap();
+        assert!((1.0..2.0).contains(&fallen_s), "{fallen_s}");
+    }
+
+    #[test]
+    fn what_brakes_or_drives_pushes_less_to_the_side() {
+        assert!(told_s(|_| 0.7, 0.0).is_some());
+        assert_eq!(told_s(|_| 0.7, -6.0), None);
+        assert_eq!(told_s(|_| 0.7, 6.0), None);
+        // The brakes excuse what they take and no more.
+        assert!(told_s(|_| 0.3, -4.0).is_some());
+    }
+}
