@@ -27,17 +27,20 @@ const LEAD_S: f64 = 0.06;
 /// How far pursuit looks ahead: the farther, the more corners are cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pursuit {
-    /// Time ahead.
-    pub ahead_s: f64,
-    /// Distance beside that: a longer car turns in more slowly.
+    /// Distance in wheelbases: a longer car turns in more slowly.
     pub ahead_wheelbases: f64,
+    /// Time ahead beside that: of a slow car noise would turn the aim.
+    pub ahead_s: f64,
+    /// The least of that distance in ways that the car goes while its side slip settles, v^2/(g k), k: rear stiffness over load. Aiming nearer than that,
+    /// a fast car weaves.
+    pub ahead_lags: f64,
 }
 
 impl Default for Pursuit {
-    /// Uses most of the grip on the development tracks (club, esses, clover; 1:10 and passenger car; mu = 0.4, 0.65, 0.9) of 0.16 to 0.36 s and 0 to 1.5
-    /// wheelbases, without leaving them.
+    /// Uses most of the grip on the development tracks (club, esses, clover; 1:10 and passenger car; mu = 0.4, 0.65, 0.9; true tires) of 0.16 to 0.36 s and 0
+    /// to 1.5 wheelbases, without leaving them, and is nearest to the line of 0 to 3 lags.
     fn default() -> Self {
-        Self { ahead_s: 0.17, ahead_wheelbases: 1.0 }
+        Self { ahead_wheelbases: 1.0, ahead_s: 0.17, ahead_lags: 2.5 }
     }
 }
 
@@ -59,7 +62,9 @@ impl Pursuing {
         let table = &at.plan.table;
         let wheelbase_m = at.vehicle.wheelbase_m();
         let speed = car.v_x_mps.hypot(car.v_y_mps).max(0.1);
-        let ahead_m = self.pursuit.ahead_s * speed + self.pursuit.ahead_wheelbases * wheelbase_m;
+        let lag_m = speed * speed / (GRAVITY_MPS2 * at.plan.tires.rear.normalized_stiffness());
+        let Pursuit { ahead_wheelbases, ahead_s, ahead_lags } = self.pursuit;
+        let ahead_m = ahead_wheelbases * wheelbase_m + (ahead_s * speed).max(ahead_lags * lag_m);
         let aim = at.track.at(place.station_m + ahead_m);
         let (sin, cos) = car.course_rad().sin_cos();
         let (dx, dy) = (aim.x_m - car.x_m, aim.y_m - car.y_m);
