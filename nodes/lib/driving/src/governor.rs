@@ -97,6 +97,12 @@ impl Default for Governor {
 }
 
 impl Governor {
+    /// Lateral acceleration that the tires push with, by their slips on the planned set; `None`: not known.
+    pub(crate) fn pushes_mps2(&self, vehicle: &VehicleParameters) -> Option<f64> {
+        let [front, rear] = self.recent.back()?.promised_mps2;
+        Some((vehicle.l_r_m * front + vehicle.l_f_m * rear) / vehicle.wheelbase_m())
+    }
+
     /// Forgets what it has seen: after a new plan.
     pub(crate) fn reset(&mut self) {
         self.recent.clear();
@@ -252,5 +258,35 @@ mod tests {
     fn what_brakes_pushes_less_to_the_side() {
         assert!(notices(|_| 0.84, 0.0, false).is_some());
         assert_eq!(notices(|_| 0.84, -3.0, false), None);
+    }
+
+    #[test]
+    fn a_car_that_turns_in_pushes_less_than_its_yaw_rate_says() {
+        let vehicle = VehicleParameters::f1tenth();
+        let axle = MagicFormula::from_stiffness(9.0, 1.5, 0.8, 0.0);
+        let tires = PacejkaParameters { front: axle, rear: axle };
+        let pushes = |front_rad: f64, rear_rad: f64| {
+            let yaw_rate_radps = 0.7 * GRAVITY_MPS2 / SPEED_MPS;
+            let v_y_mps = vehicle.l_r_m * yaw_rate_radps - SPEED_MPS * rear_rad.tan();
+            let ahead_rad = (v_y_mps + vehicle.l_f_m * yaw_rate_radps).atan2(SPEED_MPS);
+            let state = CarState {
+                stamp_s: 0.0,
+                v_x_mps: SPEED_MPS,
+                v_y_mps,
+                yaw_rate_radps,
+                x_m: 0.0,
+                y_m: 0.0,
+                heading_rad: 0.0,
+            };
+            let mut governor = Governor::default();
+            assert_eq!(governor.pushes_mps2(&vehicle), None);
+            governor.look(&state, ahead_rad + front_rad, &vehicle, &tires, false);
+            governor.pushes_mps2(&vehicle).unwrap() / GRAVITY_MPS2
+        };
+        approx::assert_relative_eq!(pushes(0.0, 0.0), 0.0, epsilon = 1e-9);
+        let share = vehicle.l_r_m / vehicle.wheelbase_m();
+        let by_hand = share * axle.normalized_force(0.06) + (1.0 - share) * axle.normalized_force(0.02);
+        approx::assert_relative_eq!(pushes(0.06, 0.02), by_hand, max_relative = 1e-6);
+        approx::assert_relative_eq!(pushes(-0.06, -0.02), -by_hand, max_relative = 1e-6);
     }
 }
