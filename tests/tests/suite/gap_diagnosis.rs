@@ -8,7 +8,7 @@ use gripsight_tests::peers::{available, cyclone, start_cyclone};
 use gripsight_tests::process::node;
 use serde_json::{Value, json};
 
-use super::identification::simulate;
+use super::identification::{play, simulate};
 
 /// Two windows on one busy core.
 const RUN: Duration = Duration::from_secs(240);
@@ -48,9 +48,7 @@ fn a_moving_window_of_a_replayed_drive_is_diagnosed_within_bounds() {
     let window = ["-p", "window_s:=20.0", "-p", "hop_s:=23.0", "-p", "reliable_inputs:=true"];
     let topics = ["-r", "odom:=/car_state/odom", "-r", "imu:=/imu/data", "-r", "wheels:=/wheel_speeds"];
     let _telemetry = node(&domain, "telemetry", &[&window[..], &topics[..], &vehicle[..]].concat());
-    let path = format!("bag:={}", bag.display());
-    let wait = "wait_for:=[/car_state/odom, /drive, /imu/data, /wheel_speeds]";
-    let _player = node(&domain, "bag_player", &["-p", &path, "-p", "rate:=2.0", "-p", wait]);
+    let _player = play(&domain, &bag, "2.0");
     // The bag stands until both have said what they make of the first window, however slow the machine is.
     let pause = |paused: bool| {
         let value = json!({"type": 1, "bool_value": paused});

@@ -24,6 +24,13 @@ pub(crate) fn drive(folder: &Path) -> (PathBuf, PathBuf) {
     simulate(folder, &["--duration", "32", "--seed", "11", "--pace", "0.9"])
 }
 
+/// Plays a drive once telemetry hears all of its topics.
+pub(crate) fn play(domain: &Domain, bag: &Path, rate: &str) -> Process {
+    let (path, speed) = (format!("bag:={}", bag.display()), format!("rate:={rate}"));
+    let wait = "wait_for:=[/car_state/odom, /drive, /imu/data, /wheel_speeds]";
+    node(domain, "bag_player", &["-p", &path, "-p", &speed, "-p", wait])
+}
+
 /// A drive as `gripsight simulate` makes it: bag and vehicle file.
 pub(crate) fn simulate(folder: &Path, arguments: &[&str]) -> (PathBuf, PathBuf) {
     let bag = folder.join("drive.mcap");
@@ -154,10 +161,7 @@ fn the_live_phi_p_is_the_offline_one_bit_for_bit_at_1x_and_at_10x() {
         let tires = listen(&domain, &python, "/identifier/pacejka", PacejkaParams::TYPE, "latched", "1");
         let _suite = suite(&domain, &vehicle, "30.0");
         tell_prior(&domain, &python);
-        let path = format!("bag:={}", bag.display());
-        let speed = format!("rate:={rate}");
-        let wait = "wait_for:=[/car_state/odom, /drive, /imu/data, /wheel_speeds]";
-        let _player = node(&domain, "bag_player", &["-p", &path, "-p", &speed, "-p", wait]);
+        let _player = play(&domain, &bag, rate);
 
         let parts = parts(&sequences);
         let live = accepted(&tires);
@@ -190,9 +194,7 @@ fn who_takes_a_prior_s_peak_hears_first_what_the_drive_alone_shows() {
     drop(plain);
     let _identifier = identifier(&domain, &vehicle, &["-p", "publish_provisional:=true"]);
     tell_prior(&domain, &python);
-    let path = format!("bag:={}", bag.display());
-    let wait = "wait_for:=[/car_state/odom, /drive, /imu/data, /wheel_speeds]";
-    let _player = node(&domain, "bag_player", &["-p", &path, "-p", "rate:=10.0", "-p", wait]);
+    let _player = play(&domain, &bag, "10.0");
 
     let shown: PacejkaParams = parsed(&tires.line(RUN));
     assert_eq!(shown.status, PacejkaParams::ACCEPTED_WITHIN, "{}", shown.reason);

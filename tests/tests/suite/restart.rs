@@ -11,7 +11,7 @@ use gripsight_tests::process::{Process, node};
 use gripsight_vehicle::VehicleParameters;
 
 use super::controller;
-use super::identification::{accepted, drive, identifier, listen, suite, tell_prior};
+use super::identification::{accepted, drive, identifier, listen, play, suite, tell_prior};
 
 const PACEJKA: &str = "/identifier/pacejka";
 const CANDIDATE: &str = "/identifier/candidate";
@@ -84,9 +84,7 @@ fn a_killed_identifier_comes_back_with_its_own_car_s_set_as_provisional_and_with
     let mpc = controller::peer(&domain, &python);
     let first = identifier(&domain, &vehicle, &[&keeps[..], &controller::OF_PEER].concat());
     tell_prior(&domain, &python);
-    let path = format!("bag:={}", bag.display());
-    let wait = "wait_for:=[/car_state/odom, /drive, /imu/data, /wheel_speeds]";
-    let _player = node(&domain, "bag_player", &["-p", &path, "-p", "rate:=10.0", "-p", wait]);
+    let _player = play(&domain, &bag, "10.0");
     let before = accepted(&tires);
     let heard = Instant::now();
     controller::assert_told(&mpc, &first, &before);
