@@ -210,6 +210,31 @@ fn less_grip_than_planned_is_noticed() {
 }
 
 #[test]
+fn a_car_that_swings_out_is_steered_along_its_travel_and_rolls() {
+    const GRIP: f64 = 0.8;
+    const SPEED_MPS: f64 = 6.0;
+    let vehicle = rear_driven();
+    // Rear slip beyond any peak; v_x times the yaw rate over what the tires can turn.
+    let asked = |side: f64, turning: f64| {
+        let mut driver = driver(set(GRIP, Trust::Accepted));
+        let yaw_rate_radps = side * turning * GRIP * 9.81 / SPEED_MPS;
+        let v_y_mps = vehicle.l_r_m * yaw_rate_radps - side * SPEED_MPS * 0.6_f64.tan();
+        let car = CarState { yaw_rate_radps, v_y_mps, ..on_the_line(&driver, 0.0, SPEED_MPS) };
+        let travel_rad = (v_y_mps + vehicle.l_f_m * yaw_rate_radps).atan2(SPEED_MPS);
+        (driver.command(&car, 0.0), travel_rad)
+    };
+    for side in [1.0, -1.0] {
+        let (swinging, travel_rad) = asked(side, 1.6);
+        assert!(side * travel_rad < 0.0);
+        let lock = vehicle.max_steering_rad;
+        assert!(side * swinging.steering_rad <= side * travel_rad.clamp(-lock, lock) + 1e-9, "{swinging:?}");
+        assert!(swinging.acceleration_mps2.abs() < 1e-9, "{swinging:?}");
+        let (steady, _) = asked(side, 0.9);
+        assert!(steady.acceleration_mps2.abs() > 0.5, "{steady:?}");
+    }
+}
+
+#[test]
 fn an_assumed_grip_is_no_promise() {
     let start = Settings::default().share * 0.51;
     let mut careful = driver(TireSet::start());
