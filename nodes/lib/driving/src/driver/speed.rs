@@ -31,23 +31,23 @@ impl Driver {
         let slides = -state.v_y_mps * state.yaw_rate_radps;
         let scrubs = (self.vehicle.l_r_m / self.vehicle.wheelbase_m() * turned * angle_rad.sin()).max(0.0);
         let resisted = slides + scrubs + limits.told.resistance_mps2(state.v_x_mps);
-        // Where the car turns in, its yaw rate is ahead of what its slips say that the tires push with; where the road gives less, its slips are. Brakes go
-        // by the smaller one, or a car that is too fast goes on; the drive by the slips. Those of tires that nobody measured say nothing.
+        // Where the car turns in, its yaw rate is ahead of what its slips say that the tires push with, and brakes that went by it let a car go on that is
+        // too fast; where it pushes over its front wheels the yaw rate is behind, and they would take the grip that it turns with. Slips on tires that
+        // nobody measured say nothing.
         let measured = if self.is_assumed() { None } else { self.governor.pushes_mps2(&self.vehicle) };
-        let pushed = measured.unwrap_or(turned).abs();
-        let left = |lateral_mps2: f64| limits.left_beside(lateral_mps2, point.curvature_1pm);
+        let left = limits.left_beside(measured.unwrap_or(turned), point.curvature_1pm);
         let wanted = slope * room + resisted + self.settings.speed_gain_1ps * (speed_mps - state.v_x_mps);
         // A tire that slides has no force to spare, and what drives or brakes it turns the car further.
         let steady = 1.0 - self.plan.table.swings(state.rear_slip_rad(&self.vehicle), turned);
         let drive = limits.drive_at_mps2(state.v_x_mps)
-            * left(pushed).max(LEAST_DRIVE)
+            * left.max(LEAST_DRIVE)
             * if wide > 0.0 { 0.5 } else { 1.0 }
             * steady;
         // Whoever is too fast, or was too fast for a plan that was taken back, does not get around by steering: the brakes come first.
         let over = ((state.v_x_mps / speed_mps.max(0.1) - 1.0) / TOO_FAST).clamp(0.0, 1.0);
         let over = if self.held_back() { 1.0 } else { over };
         let least = LEAST_BRAKE[0] + (LEAST_BRAKE[1] - LEAST_BRAKE[0]) * over;
-        let brake = limits.brake_mps2 * left(pushed.min(turned.abs())).max(least) * steady;
+        let brake = limits.brake_mps2 * left.max(least) * steady;
         (speed_mps, wanted.clamp(-brake, drive))
     }
 }
