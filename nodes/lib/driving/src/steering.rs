@@ -15,7 +15,7 @@ use crate::{Place, Track};
 /// Delays below this are not worth a prediction.
 pub(crate) const PROMPT_S: f64 = 0.004;
 /// Front slip over that of the axle's largest force from which more only scrubs.
-const MOST_SLIP: f64 = 1.15;
+pub(crate) const MOST_SLIP: f64 = 1.15;
 
 /// Which controller steers.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -3,6 +3,7 @@
 use super::Driver;
 use crate::Place;
 use crate::state::CarState;
+use crate::steering::MOST_SLIP;
 
 /// Share of the drive that is always left: cornering alone slows the car.
 const LEAST_DRIVE: f64 = 0.5;
@@ -27,6 +28,7 @@ impl Driver {
         let (speed_mps, slope) = self.plan.profile.at(place.station_m + ahead_m);
         let speed_mps = speed_mps * room;
         let turned = state.v_x_mps * state.yaw_rate_radps;
+        let speed_mps = self.gets_around_mps(state, place, angle_rad).min(speed_mps);
         // Front tires that steer and a body that slides sideways hold the car back, and so do air and rolling.
         let slides = -state.v_y_mps * state.yaw_rate_radps;
         let scrubs = (self.vehicle.l_r_m / self.vehicle.wheelbase_m() * turned * angle_rad.sin()).max(0.0);
@@ -49,5 +51,20 @@ impl Driver {
         let least = LEAST_BRAKE[0] + (LEAST_BRAKE[1] - LEAST_BRAKE[0]) * over;
         let brake = limits.brake_mps2 * left.max(least) * steady;
         (speed_mps, wanted.clamp(-brake, drive))
+    }
+
+    /// Speed at which the car gets around here, where its front axle gives all that it has and that is less than the line asks for; else no limit. Who
+    /// waits until the car is wide has to brake with what it turns with.
+    fn gets_around_mps(&self, state: &CarState, place: Place, angle_rad: f64) -> f64 {
+        let turned = state.v_x_mps * state.yaw_rate_radps;
+        let asked = state.v_x_mps.powi(2) * self.track.at(place.station_m).curvature_1pm;
+        let ahead_rad =
+            (state.v_y_mps + self.vehicle.l_f_m * state.yaw_rate_radps).atan2(state.v_x_mps.max(0.1));
+        let slip = (angle_rad - ahead_rad) * asked.signum() / self.plan.table.front_slip_rad();
+        let slides = ((slip - 1.0) / (MOST_SLIP - 1.0)).clamp(0.0, 1.0);
+        if slides == 0.0 || turned * asked <= 0.0 || turned.abs() >= asked.abs() {
+            return f64::INFINITY;
+        }
+        state.v_x_mps * (1.0 + slides * ((turned / asked).sqrt() - 1.0))
     }
 }
