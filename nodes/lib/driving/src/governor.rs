@@ -109,7 +109,8 @@ impl Governor {
         self.missing_s = 0.0;
     }
 
-    fn stiffer(&self) -> f64 {
+    /// How much stiffer the car's tires are than those assumed.
+    pub(crate) fn stiffer(&self) -> f64 {
         let (both, square) = self.stiffness;
         if square > 0.0 { (both / square).clamp(1.0, STIFFER) } else { 1.0 }
     }

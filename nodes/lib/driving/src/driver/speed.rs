@@ -60,7 +60,8 @@ impl Driver {
         let asked = state.v_x_mps.powi(2) * self.track.at(place.station_m).curvature_1pm;
         let ahead_rad =
             (state.v_y_mps + self.vehicle.l_f_m * state.yaw_rate_radps).atan2(state.v_x_mps.max(0.1));
-        let slip = (angle_rad - ahead_rad) * asked.signum() / self.plan.table.front_slip_rad();
+        let stiffer = if self.is_assumed() { self.governor.stiffer() } else { 1.0 };
+        let slip = stiffer * (angle_rad - ahead_rad) * asked.signum() / self.plan.table.front_slip_rad();
         let slides = ((slip - 1.0) / (MOST_SLIP - 1.0)).clamp(0.0, 1.0);
         if slides == 0.0 || turned * asked <= 0.0 || turned.abs() >= asked.abs() {
             return f64::INFINITY;
