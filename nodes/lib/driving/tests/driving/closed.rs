@@ -235,6 +235,32 @@ fn a_car_that_swings_out_is_steered_along_its_travel_and_rolls() {
 }
 
 #[test]
+fn a_car_that_pushes_over_its_front_wheels_slows_down_before_it_is_wide() {
+    // In the tightest corner, on the line and at the planned speed, turning with a share of what the line asks for.
+    let asked = |share: f64, slip_rad: f64| {
+        const OUTWARD_RAD: f64 = 0.4;
+        let mut driver = driver(set(0.8, Trust::Accepted));
+        let curvature = |s: f64| driver.track().at(s).curvature_1pm;
+        let stations = (0..600).map(|k| f64::from(k) * 0.1);
+        let station_m = stations.max_by(|a, b| curvature(*a).abs().total_cmp(&curvature(*b).abs())).unwrap();
+        let (v_x_mps, k) = (driver.profile().at(station_m).0, curvature(station_m));
+        let line = on_the_line(&driver, station_m, v_x_mps);
+        let yaw_rate_radps = share * v_x_mps * k;
+        let v_y_mps = rear_driven().l_r_m * yaw_rate_radps - v_x_mps * slip_rad * k.signum();
+        let heading_rad = line.heading_rad - OUTWARD_RAD * k.signum();
+        (driver.command(&CarState { yaw_rate_radps, v_y_mps, heading_rad, ..line }, 0.0), v_x_mps)
+    };
+    let (pushes, v_x_mps) = asked(0.81, 0.2);
+    approx::assert_relative_eq!(pushes.speed_mps, 0.9 * v_x_mps, max_relative = 1e-6);
+    assert!(pushes.acceleration_mps2 < -0.5, "{pushes:?}");
+    // Wheels that do not slip yet have grip left.
+    let (turns_in, v_x_mps) = asked(0.81, -0.1);
+    approx::assert_relative_eq!(turns_in.speed_mps, v_x_mps, max_relative = 1e-6);
+    let (steady, v_x_mps) = asked(1.0, 0.2);
+    approx::assert_relative_eq!(steady.speed_mps, v_x_mps, max_relative = 1e-6);
+}
+
+#[test]
 fn an_assumed_grip_is_no_promise() {
     let start = Settings::default().share * 0.51;
     let mut careful = driver(TireSet::start());
