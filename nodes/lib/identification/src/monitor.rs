@@ -9,7 +9,7 @@
 
 use gripsight_model::{Rollout, Window};
 use gripsight_signals::{DataHealth, StateSequence};
-use gripsight_vehicle::{GRAVITY_MPS2, VehicleParameters};
+use gripsight_vehicle::{GRAVITY_MPS2, MagicFormula, VehicleParameters};
 use serde::Serialize;
 
 use crate::data::Data;
@@ -179,6 +179,20 @@ impl Monitor {
             let change = (now - then).abs();
             !silent && error.is_some_and(|e| change > SIGNIFICANT * e) && change > NOTICEABLE * then
         };
+        // A peak that nobody reached may be anywhere: of such an axle it is news that the force shown is there no more.
+        let AcceptedSet { phi_p, promised, peak_reached, valid_within, .. } = &self.set;
+        let given_no_more = |then: MagicFormula, now: f64, promised: MagicFormula, valid_rad: f64| {
+            MagicFormula { d: now, ..then }.normalized_force(valid_rad) < promised.normalized_force(valid_rad)
+        };
+        let slip_rad = &valid_within.slip_rad;
+        let changed = PerAxle {
+            front: differs(axle(2))
+                && (peak_reached.front
+                    || given_no_more(phi_p.front, axle(2).0, promised.front, slip_rad.front)),
+            rear: differs(axle(6))
+                && (peak_reached.rear
+                    || given_no_more(phi_p.rear, axle(6).0, promised.rear, slip_rad.rear)),
+        };
         let stamp_ns = |time_s: f64| sequence.start_stamp_ns + (time_s * gripsight_signals::NS_PER_S) as i64;
         Ok(Reading {
             stamp_ns: stamp_ns(sequence.duration_s()),
@@ -186,7 +200,7 @@ impl Monitor {
             error_ratio: rollout_errors(&model, &p, &windows, &sigma).normalized,
             peak_factor: PerAxle { front: axle(2), rear: axle(6) }
                 .map(|(now, error, _)| Estimate::from_error(now, error)),
-            changed: differs(axle(2)) || differs(axle(6)),
+            changed: changed.front || changed.rear,
         })
     }
 }
