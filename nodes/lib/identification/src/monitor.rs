@@ -11,6 +11,7 @@ use gripsight_model::{Rollout, Window};
 use gripsight_signals::{DataHealth, StateSequence};
 use gripsight_vehicle::{GRAVITY_MPS2, MagicFormula, VehicleParameters};
 use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::data::Data;
 use crate::judge::rollout_errors;
@@ -19,10 +20,10 @@ use crate::tires::D_BOUNDS;
 use crate::{AcceptedSet, Estimate, FrictionPrior, IdentificationError, PerAxle, Usable, vehicle_hash};
 use gripsight_estimation::shooting::{Parameter, Problem, TOLERANCE, fit};
 
-/// Smallest change of D that is worth a notice, as a share of it.
+/// Smallest change of the force where the car was driven that is worth a notice, as a share of it.
 const NOTICEABLE: f64 = 0.08;
-/// A change has to be this many standard errors large.
-const SIGNIFICANT: f64 = 3.0;
+/// Chance, one side, of a change that is none: three standard errors, were these known.
+const FALSE_ALARM: f64 = 0.001_35;
 /// What is looked at: long enough for some corners, short enough for a notice while the change is fresh.
 const LOOK_S: f64 = 10.0;
 /// Fewest windows of the telemetry to look at.
@@ -126,6 +127,18 @@ impl Monitor {
         within
     }
 
+    /// Largest slips of front and rear axle in windows, by the set's own account.
+    fn slips_driven_rad(&self, model: &TireRollout<'_>, p: &[f64], windows: &[Window]) -> [f64; 2] {
+        let mut most_rad = [0.0_f64; 2];
+        for window in windows {
+            model.trajectory(p, model.start_guess(window), window, |visit| {
+                let (front, rear) = visit.slip_rad;
+                most_rad = [most_rad[0].max(front.abs()), most_rad[1].max(rear.abs())];
+            });
+        }
+        most_rad
+    }
+
     /// The same with the telemetry made ready.
     pub(crate) fn read(&self, data: &Data, sequence: &StateSequence) -> Result<Reading, IdentificationError> {
         let model = TireRollout::new(&self.vehicle, data);
@@ -174,33 +187,35 @@ impl Monitor {
         let found = solve(&p, &windows, true);
         let costs = |p: &[f64]| solve(p, &all, false).linearization.window_costs;
         let since = change(&costs(&p), &costs(&found.parameters));
-        let axle = |j: usize| (found.parameters[j], found.standard_error(j), p[j]);
-        let differs = |(now, error, then): (f64, Option<f64>, f64)| {
-            let change = (now - then).abs();
-            !silent && error.is_some_and(|e| change > SIGNIFICANT * e) && change > NOTICEABLE * then
+        let axle = |j: usize| (found.parameters[j], found.standard_error(j));
+        // The errors are those of a few windows: Student's t, less the two peaks.
+        let freedom = windows.len().saturating_sub(2).max(1) as f64;
+        let significant =
+            StudentsT::new(0.0, 1.0, freedom).map_or(f64::INFINITY, |t| t.inverse_cdf(1.0 - FALSE_ALARM));
+        // What a change of D comes to where the car was driven: a peak is not known from gentle corners, and need not be.
+        let driven = self.slips_driven_rad(&model, &p, &windows);
+        let differs = |axle: usize, then: MagicFormula, promised: MagicFormula, reached: bool| {
+            let (now, error, was) =
+                (found.parameters[4 * axle + 2], found.standard_error(4 * axle + 2), p[4 * axle + 2]);
+            let after = MagicFormula::from_stiffness(then.normalized_stiffness(), then.c, now, then.e);
+            let force = |tire: &MagicFormula| tire.normalized_force(driven[axle]);
+            // Of a peak that nobody reached it is no news that it lies elsewhere, only that the force shown is there no more.
+            !silent
+                && error.is_some_and(|e| (now - was).abs() > significant * e)
+                && (force(&after) - force(&then)).abs() > NOTICEABLE * force(&then)
+                && (reached || force(&after) < force(&promised))
         };
-        // A peak that nobody reached may be anywhere: of such an axle it is news that the force shown is there no more.
-        let AcceptedSet { phi_p, promised, peak_reached, valid_within, .. } = &self.set;
-        let given_no_more = |then: MagicFormula, now: f64, promised: MagicFormula, valid_rad: f64| {
-            MagicFormula { d: now, ..then }.normalized_force(valid_rad) < promised.normalized_force(valid_rad)
-        };
-        let slip_rad = &valid_within.slip_rad;
-        let changed = PerAxle {
-            front: differs(axle(2))
-                && (peak_reached.front
-                    || given_no_more(phi_p.front, axle(2).0, promised.front, slip_rad.front)),
-            rear: differs(axle(6))
-                && (peak_reached.rear
-                    || given_no_more(phi_p.rear, axle(6).0, promised.rear, slip_rad.rear)),
-        };
+        let AcceptedSet { phi_p, promised, peak_reached, .. } = &self.set;
+        let changed = differs(0, phi_p.front, promised.front, peak_reached.front)
+            || differs(1, phi_p.rear, promised.rear, peak_reached.rear);
         let stamp_ns = |time_s: f64| sequence.start_stamp_ns + (time_s * gripsight_signals::NS_PER_S) as i64;
         Ok(Reading {
             stamp_ns: stamp_ns(sequence.duration_s()),
             since_ns: stamp_ns(all.get(since).map_or(from_s, begin_s)),
             error_ratio: rollout_errors(&model, &p, &windows, &sigma).normalized,
             peak_factor: PerAxle { front: axle(2), rear: axle(6) }
-                .map(|(now, error, _)| Estimate::from_error(now, error)),
-            changed: changed.front || changed.rear,
+                .map(|(now, error)| Estimate::from_error(now, error)),
+            changed,
         })
     }
 }
