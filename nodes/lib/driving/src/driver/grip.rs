@@ -80,12 +80,13 @@ impl Driver {
         let careful = (ASSURED * self.turned).max(CAREFUL * share * shown).min(share * shown);
         let driven = self.driven.max(if base.trust == Trust::Assumed { careful } else { share * shown });
         let driven = driven.max(self.turned.min(share * self.start.grip()));
-        // As without a set, in the middle of the lap.
-        let assured =
-            if self.explores() { (ASSURED * self.turned).min(share * self.start.grip()) } else { 0.0 };
         let over = self.named.grip.map_or(1.0, |[front, rear]| front.min(rear));
         let likely_peak = base.likely_peaks.map(|[front, rear]| over * front.min(rear));
         let likely = likely_peak.unwrap_or(f64::INFINITY);
+        // As without a set, in the middle of the lap; in smaller steps beyond what is likely.
+        let assured = (ASSURED * self.turned).min(share * self.start.grip());
+        let assured =
+            if self.explores() { assured.min((LIKELY * likely).max(step * self.turned)) } else { 0.0 };
         let proven = PROVEN.min(step) * self.driven;
         let most = (beyond * shown).max(proven);
         let bold = (step * driven).min(most);
