@@ -17,6 +17,9 @@ const WINDOW_S: (f64, f64) = (30.0, 8.0);
 /// A window that grows is looked at again after so long, as `telemetry` gives it out (`first_s` of `params/suite.yaml`, and every half of that).
 const GROWTH_S: f64 = 4.0;
 
+/// How the reason begins that tells of another road.
+const CHANGED: &str = "the grip has changed";
+
 /// A grip that stays fallen is said again after so long.
 const EVERY_NS: i64 = 1_000_000_000;
 
@@ -35,6 +38,9 @@ pub(crate) struct Learner {
     due_s: f64,
     /// Lateral acceleration over g that the set in use promises.
     pub(crate) promised: Option<f64>,
+    /// Windows identified, and those in which the grip was said to have changed.
+    pub(crate) looks: u32,
+    pub(crate) told_changed: u32,
 }
 
 impl Learner {
@@ -50,6 +56,8 @@ impl Learner {
             config: Config { residual: ResidualKind::None, ..Config::default() },
             due_s: WINDOW_S.1,
             promised: None,
+            looks: 0,
+            told_changed: 0,
         }
     }
 
@@ -106,6 +114,8 @@ impl Learner {
                 return Ok(());
             }
         };
+        self.looks += 1;
+        self.told_changed += u32::from(outcome.reasons.iter().any(|reason| reason.starts_with(CHANGED)));
         if verbose {
             eprintln!(
                 "  {}: D {:.3} {:.3} found {:.3} {:.3} reached {} {} delay {:.3} {}",

@@ -57,8 +57,8 @@ struct Arguments {
     /// Cars
     #[arg(long, value_delimiter = ',', default_value = "f1tenth,passenger_car")]
     cars: Vec<String>,
-    /// Tracks
-    #[arg(long, value_delimiter = ',', default_value = "harbor,valley,quarry,delta,lagoon")]
+    /// Tracks; no constant of the driver was chosen on those driven without this option
+    #[arg(long, value_delimiter = ',', default_value = "ridge,basin,summit,meadow,canyon")]
     tracks: Vec<String>,
     /// Frictions of the road, for laps
     #[arg(long, value_delimiter = ',', default_value = "0.4,0.65,0.9")]

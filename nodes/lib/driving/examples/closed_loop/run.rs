@@ -81,6 +81,8 @@ pub(crate) struct Run {
     pub(crate) laps: Vec<Lap>,
     /// From the first corner to the first set.
     pub(crate) first_set_s: Option<f64>,
+    /// Windows identified, and those in which the grip was said to have changed.
+    pub(crate) looks: [u32; 2],
     /// Why it ended early.
     pub(crate) wreck: Option<&'static str>,
 }
@@ -103,5 +105,6 @@ pub(crate) fn drive(case: &Case, variant: Variant, verbose: bool) -> Result<Run>
             wreck = wreck.or(Some("too slow"));
         }
     }
-    Ok(Run { first_set_s: run.referee.first_set_s, laps: run.referee.laps, wreck })
+    let looks = run.learner.as_ref().map_or([0; 2], |learner| [learner.looks, learner.told_changed]);
+    Ok(Run { looks, first_set_s: run.referee.first_set_s, laps: run.referee.laps, wreck })
 }

@@ -37,6 +37,11 @@ pub(crate) struct Row {
     first_set_s: Option<f64>,
     #[serde(default)]
     promised: Option<f64>,
+    /// Windows identified in the run, and those in which the grip was said to have changed, which it has not.
+    #[serde(default)]
+    looks: u32,
+    #[serde(default)]
+    told_changed: u32,
 }
 
 impl Row {
@@ -70,6 +75,8 @@ pub(crate) fn rows(case: &Case, variant: Variant, run: &Run, seconds: f64) -> Ve
         run_seconds: parts(seconds, 1e2),
         first_set_s: run.first_set_s.map(|s| parts(s, 1e2)),
         promised: lap.promised.map(|grip| parts(grip, 1e4)),
+        looks: run.looks[0],
+        told_changed: run.looks[1],
     };
     if run.laps.is_empty() {
         return vec![row(0, &Lap { time_s: f64::NAN, ..Lap::default() })];
@@ -204,9 +211,11 @@ fn growth(rows: &[Row], car: &str) -> String {
         let grown: Vec<f64> =
             driven.iter().filter_map(|d| d.lap(GROWN.0 - 1)).map(|r| r.promised.unwrap_or(0.0)).collect();
         let enough = grown.iter().filter(|&&share| share >= GROWN.1).count();
+        let sum = |of: fn(&Row) -> u32| driven.iter().map(|d| of(d.0[0])).sum::<u32>();
+        let (looks, told) = (sum(|r| r.looks), sum(|r| r.told_changed));
         let _ = writeln!(
             text,
-            "{}: a set {SOON_S} s after the first corner in {soon} of {} runs, {:.1} s in the median; at the end of lap {} it promises {:.0} % of the true grip in the median, {:.0} % or more in {enough} of {}.",
+            "{}: a set {SOON_S} s after the first corner in {soon} of {} runs, {:.1} s in the median; at the end of lap {} it promises {:.0} % of the true grip in the median, {:.0} % or more in {enough} of {}. The grip was said to have changed, which it had not, in {told} of {looks} windows.",
             variant.name(),
             driven.len(),
             median(first),
