@@ -45,6 +45,10 @@ pub(crate) fn judge(run: &Identification, envelope: &Envelope, outcome: &mut Out
         (true, false, Some(_)) => Status::Provisional,
         _ => Status::Rejected,
     };
+    if outcome.status == Status::Rejected {
+        // What speaks against the fit speaks against its peak by a prior, too.
+        outcome.provisional = None;
+    }
     outcome.accepted = outcome.status.accepted();
     (outcome.phi_p, outcome.valid_within) = match (outcome.status, &outcome.provisional) {
         (Status::Accepted | Status::AcceptedWithin, _) => (envelope.tires, envelope.valid_within),

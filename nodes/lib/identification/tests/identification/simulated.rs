@@ -2,7 +2,7 @@
 
 use gripsight_identification::{
     Candidate, Config, FrictionPrior, Identification, IdentificationError, Method, Monitor, Next, PerAxle,
-    Range, ResidualKind, RunKey, SignalCorrections, Started, identify, train_residual,
+    Range, ResidualKind, RunKey, SignalCorrections, Started, Status, identify, train_residual,
 };
 use gripsight_reference_car::{EffectSetting, Recording};
 use gripsight_signals::StateSequence;
@@ -205,6 +205,22 @@ fn a_prior_has_no_say_where_the_peaks_are_reached() {
     });
     assert_eq!(ends[0], ends[1]);
     assert_eq!(ends[0], ends[2]);
+}
+
+#[test]
+fn a_fit_that_is_refused_has_no_peak_by_a_prior_either() {
+    let prior = Some(FrictionPrior { mu: 0.65, sigma: 0.1 });
+    let mut refused = 0;
+    for seed in 0..6 {
+        let (_, sequence, vehicle) =
+            drive(scenario("passenger_car", "summit", 0.65, 0.4, seed).duration(9.0));
+        let outcome = identify(&sequence, &vehicle, prior, None, &quick(), &mut |_| {}).unwrap();
+        if outcome.status == Status::Rejected {
+            refused += 1;
+            assert!(outcome.provisional.is_none(), "{:?}", outcome.reasons);
+        }
+    }
+    assert!(refused > 0);
 }
 
 #[test]
