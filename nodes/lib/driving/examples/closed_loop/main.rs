@@ -57,7 +57,7 @@ struct Arguments {
     /// Cars
     #[arg(long, value_delimiter = ',', default_value = "f1tenth,passenger_car")]
     cars: Vec<String>,
-    /// Tracks; no constant of the driver was chosen on those driven without this option
+    /// Tracks; no constant of the driver was chosen on the default ones
     #[arg(long, value_delimiter = ',', default_value = "ridge,basin,summit,meadow,canyon")]
     tracks: Vec<String>,
     /// Frictions of the road, for laps
