@@ -7,7 +7,7 @@ use crate::events::Observation;
 use crate::levels::Levels;
 use crate::state::{
     A_X, A_Y, ALPHA, ARM, B_R, B_X, B_Y, Drive, LATE, MOTION, Matrix, N, OFF, PLACE, PSI, R, RATE, SCALE,
-    TILT, V_X, V_Y, Vector, X, Y, jacobian, rate, step,
+    TILT, V_X, V_Y, Vector, X, Y, between, jacobian, rate, step,
 };
 
 /// v_x, v_y and yaw rate with their covariance.
@@ -26,9 +26,11 @@ pub struct Motion {
 }
 
 impl Motion {
+    /// Places of the three in the state.
+    pub(crate) const PLACES: [usize; 3] = [V_X, V_Y, R];
+
     pub(crate) fn of(time_s: f64, s: &Vector, p: &Matrix) -> Self {
-        const PLACES: [usize; 3] = [V_X, V_Y, R];
-        let covariance = PLACES.map(|i| PLACES.map(|j| p[(i, j)]));
+        let covariance = Self::PLACES.map(|i| Self::PLACES.map(|j| p[(i, j)]));
         Self { time_s, v_x_mps: s[V_X], v_y_mps: s[V_Y], yaw_rate_radps: s[R], covariance }
     }
 
@@ -46,6 +48,27 @@ const GATE_ONE: f64 = 10.83;
 /// So many poses in a row that contradict are a jump of the localisation.
 pub(crate) const JUMP_POSES: usize = 4;
 
+/// What an observation did to the state: what the way back needs of it.
+#[derive(Debug)]
+pub(crate) enum Update {
+    /// A number was taken, by its row.
+    One { h: Vector, gain: Vector, innovation: f64, variance: f64 },
+    /// A pose was taken, by its rows.
+    Pose(Box<PoseUpdate>),
+    /// So many of the first states began anew.
+    Anew(usize),
+}
+
+/// A pose that was taken.
+#[derive(Debug)]
+pub(crate) struct PoseUpdate {
+    pub(crate) h: SMatrix<f64, 3, N>,
+    pub(crate) gain: SMatrix<f64, N, 3>,
+    pub(crate) innovation: Vector3<f64>,
+    /// Inverse of the innovation's covariance.
+    pub(crate) inverse: Matrix3<f64>,
+}
+
 /// The filter, live.
 #[derive(Debug, Clone)]
 pub struct Filter {
@@ -58,8 +81,6 @@ pub struct Filter {
     contradicting: usize,
     /// Poses since the last jump that did not contradict.
     agreeing: usize,
-    /// How many of the first states began anew with the last observation that did so.
-    pub(crate) anew: usize,
     /// Times at which the localisation jumped.
     pub(crate) jumps_s: Vec<f64>,
     /// Observations left out.
@@ -106,7 +127,6 @@ impl Filter {
             spread,
             contradicting: 0,
             agreeing: 0,
-            anew: 0,
             jumps_s: Vec::new(),
             left_out: 0,
         }
@@ -121,14 +141,14 @@ impl Filter {
         }
         let (s, transition, noise) = step(&self.s, dt_s, &self.drive);
         self.s = s;
-        self.p = transition * self.p * transition.transpose() + noise;
+        self.p = between(&self.p, &transition.transpose()) + noise;
         transition
     }
 
     /// Takes an observation at its time.
     pub fn push(&mut self, time_s: f64, observation: &Observation) -> Motion {
         self.advance(time_s);
-        self.observe(observation);
+        self.observe(observation, &mut |_| ());
         self.motion()
     }
 
@@ -138,26 +158,27 @@ impl Filter {
         Motion::of(self.time_s.unwrap_or(0.0), &self.s, &self.p)
     }
 
-    pub(crate) fn observe(&mut self, observation: &Observation) {
+    /// Takes an observation at the time reached, and tells what it did.
+    pub(crate) fn observe(&mut self, observation: &Observation, tell: &mut impl FnMut(Update)) {
         let l = self.levels;
         let s = self.s;
         let mut h = Vector::zeros();
         match *observation {
-            Observation::Pose { x_m, y_m, yaw_rad } => self.pose(x_m, y_m, yaw_rad),
+            Observation::Pose { x_m, y_m, yaw_rad } => self.pose(x_m, y_m, yaw_rad, tell),
             Observation::Speed(v_mps) => {
                 h[V_X] = 1.0 + s[SCALE];
                 h[SCALE] = s[V_X];
-                self.one(v_mps - (1.0 + s[SCALE]) * s[V_X], &h, l.v_x_mps);
+                self.one(v_mps - (1.0 + s[SCALE]) * s[V_X], &h, l.v_x_mps, tell);
             }
             Observation::LateralSpeed(v_mps) => {
                 h[V_Y] = 1.0;
-                self.one(v_mps - s[V_Y], &h, l.v_y_mps);
+                self.one(v_mps - s[V_Y], &h, l.v_y_mps, tell);
             }
             Observation::YawRate(r_radps) => {
                 h[R] = 1.0 + s[RATE];
                 h[B_R] = 1.0;
                 h[RATE] = s[R];
-                self.one(r_radps - (1.0 + s[RATE]) * s[R] - s[B_R], &h, l.yaw_rate_radps);
+                self.one(r_radps - (1.0 + s[RATE]) * s[R] - s[B_R], &h, l.yaw_rate_radps, tell);
             }
             Observation::Acceleration { a_x_mps2, a_y_mps2 } => {
                 h[A_X] = 1.0;
@@ -166,7 +187,12 @@ impl Filter {
                 h[ARM] = -s[R] * s[R];
                 // A product of two unknowns is less certain than its slopes say: the second-order term counts as noise.
                 let product = 2.0 * s[R].abs() * self.product(ARM, R);
-                self.one(a_x_mps2 - (s[A_X] + s[B_X] - s[ARM] * s[R] * s[R]), &h, l.a_x_mps2.hypot(product));
+                self.one(
+                    a_x_mps2 - (s[A_X] + s[B_X] - s[ARM] * s[R] * s[R]),
+                    &h,
+                    l.a_x_mps2.hypot(product),
+                    tell,
+                );
                 let s = self.s;
                 let mut h = Vector::zeros();
                 let (force, scale) = (s[A_Y] + s[ARM] * s[ALPHA], 1.0 + s[TILT]);
@@ -176,7 +202,7 @@ impl Filter {
                 h[ARM] = scale * s[ALPHA];
                 h[TILT] = force;
                 let product = self.product(ARM, ALPHA).hypot(self.product(TILT, A_Y));
-                self.one(a_y_mps2 - (scale * force + s[B_Y]), &h, l.a_y_mps2.hypot(product));
+                self.one(a_y_mps2 - (scale * force + s[B_Y]), &h, l.a_y_mps2.hypot(product), tell);
             }
         }
     }
@@ -187,7 +213,7 @@ impl Filter {
     }
 
     /// Takes one number by the row `h`.
-    fn one(&mut self, innovation: f64, h: &Vector, sigma: f64) {
+    fn one(&mut self, innovation: f64, h: &Vector, sigma: f64, tell: &mut impl FnMut(Update)) {
         let ph = self.p * h;
         let mut variance = h.dot(&ph) + sigma * sigma;
         if innovation * innovation > GATE_ONE * variance {
@@ -203,9 +229,10 @@ impl Filter {
         self.s += gain * innovation;
         self.p -= gain * ph.transpose();
         self.p = (self.p + self.p.transpose()) * 0.5;
+        tell(Update::One { h: *h, gain, innovation, variance });
     }
 
-    fn pose(&mut self, x_m: f64, y_m: f64, yaw_rad: f64) {
+    fn pose(&mut self, x_m: f64, y_m: f64, yaw_rad: f64, tell: &mut impl FnMut(Update)) {
         let turns = ((self.s[PSI] - yaw_rad) / std::f64::consts::TAU).round();
         // A pose that is later than was taken off says where the car was.
         let late_s = self.s[LATE];
@@ -239,7 +266,7 @@ impl Filter {
             if self.contradicting < JUMP_POSES {
                 return;
             }
-            self.begin_anew(x_m, y_m, predicted[2] + innovation[2]);
+            tell(Update::Anew(self.begin_anew(x_m, y_m, predicted[2] + innovation[2])));
             return;
         }
         self.contradicting = 0;
@@ -248,15 +275,16 @@ impl Filter {
         self.s += gain * innovation;
         self.p -= gain * columns.transpose();
         self.p = (self.p + self.p.transpose()) * 0.5;
+        tell(Update::Pose(Box::new(PoseUpdate { h, gain, innovation, inverse })));
     }
 
     /// The localisation has jumped: place and heading are what it says now, and the motion is what it was. Where it jumps again and again it is the motion
-    /// that is not known any more.
-    fn begin_anew(&mut self, x_m: f64, y_m: f64, yaw_rad: f64) {
+    /// that is not known any more. Gives how many of the first states begin anew.
+    fn begin_anew(&mut self, x_m: f64, y_m: f64, yaw_rad: f64) -> usize {
         self.contradicting = 0;
-        self.anew = PLACE;
+        let mut anew = PLACE;
         if self.agreeing < JUMP_POSES && !self.jumps_s.is_empty() {
-            self.anew = MOTION;
+            anew = MOTION;
             for place in PLACE..MOTION {
                 for other in 0..N {
                     self.p[(place, other)] = 0.0;
@@ -290,5 +318,6 @@ impl Filter {
             self.p[(off, off)] = off2;
             (self.p[(place, off)], self.p[(off, place)]) = (-off2, -off2);
         }
+        anew
     }
 }

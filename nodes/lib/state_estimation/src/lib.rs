@@ -9,14 +9,14 @@
 //! ```
 //!
 //! with what the localisation is off by for tenths of a second (a first-order Gauss-Markov process on each coordinate of a pose), and constants beside: biases of the accelerometers and of the gyroscope, the place of the inertial unit ahead of the point of the poses,
-//! and the scales of speed, yaw rate and lateral acceleration (a body that rolls adds to it). [`smooth`] runs an extended Kalman filter forward and a Rauch-Tung-Striebel smoother back (offline); [`Filter`] is
+//! and the scales of speed, yaw rate and lateral acceleration (a body that rolls adds to it). [`smooth`] runs an extended Kalman filter forward and a modified Bryson-Frazier smoother back (offline); [`Filter`] is
 //! the forward half alone (live). How strong the white noises are, and how noisy each sensor is, is taken from the recording itself
 //! ([`Levels`]): its noise from sample to sample, and what poses and sensors leave beside each other over tenths of a second, which by its growth with the span is the sensor's or the
 //! localisation's. A pose that contradicts what is known by more than chance does is left out; where poses go on contradicting, the
 //! localisation has jumped, and position and heading begin anew. The delay of the poses is that at which their heading follows the integrated
 //! yaw rate best.
 //!
-//! Source of the smoother: Rauch, Tung, Striebel, AIAA Journal 3 (1965), 1445-1450.
+//! Source of the smoother: Bierman, International Journal of Control 18 (1973), 65-75 (the modified Bryson-Frazier pass).
 
 mod coloured;
 mod error;

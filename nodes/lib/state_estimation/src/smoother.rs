@@ -1,13 +1,14 @@
 //! Forward by the filter, back by the smoother.
 
 use gripsight_signals::{StateSequence, is_dead_reckoning, pose_delay_s};
+use nalgebra::SMatrix;
 use serde::Serialize;
 
 use crate::error::StateError;
 use crate::events::events;
-use crate::filter::{Filter, JUMP_POSES, Motion};
+use crate::filter::{Filter, JUMP_POSES, Motion, Update};
 use crate::levels::Levels;
-use crate::state::{ARM, B_R, B_X, B_Y, LATE, Matrix, PSI, RATE, SCALE, TILT, V_X, Vector, X, Y};
+use crate::state::{ARM, B_R, B_X, B_Y, LATE, Matrix, N, PSI, RATE, SCALE, TILT, V_X, Vector, X, Y, between};
 
 /// What the recording says of the motion at every sample.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -38,15 +39,28 @@ pub struct Smoothed {
     pub a_y_scale: (f64, f64),
 }
 
-/// Steps between which the way back needs all that is known.
+/// A time of observations, as the way back needs it.
 struct Step {
     time_s: f64,
     /// From the step before to this one.
     transition: Matrix,
-    predicted: (Vector, Matrix),
-    known: (Vector, Matrix),
-    /// How many of the first states began anew here: nothing of them goes back.
-    anew: usize,
+    /// What the observations did, in their order.
+    updates: Vec<Update>,
+    /// What is known after them.
+    known: Known,
+}
+
+/// The motion at a step and its rows of the covariance.
+struct Known {
+    motion: Motion,
+    rows: SMatrix<f64, 3, N>,
+}
+
+impl Known {
+    fn of(time_s: f64, filter: &Filter) -> Self {
+        let rows = SMatrix::from_fn(|i, j| filter.p[(Motion::PLACES[i], j)]);
+        Self { motion: Motion::of(time_s, &filter.s, &filter.p), rows }
+    }
 }
 
 /// Poses that a beginning needs.
@@ -83,32 +97,32 @@ pub fn smooth(sequence: &StateSequence) -> Result<Smoothed, StateError> {
     while place < events.len() {
         let time_s = events[place].0;
         let transition = filter.advance(time_s);
-        let predicted = (filter.s, filter.p);
-        let jumps = filter.jumps_s.len();
+        let mut updates = Vec::new();
         while place < events.len() && events[place].0 - time_s < 1e-6 {
-            filter.observe(&events[place].1);
+            filter.observe(&events[place].1, &mut |update| updates.push(update));
             place += 1;
         }
         if !(filter.s.iter().all(|v| v.is_finite()) && filter.p.diagonal().iter().all(|v| *v >= 0.0)) {
             return Err(StateError::Diverged { time_s });
         }
-        let anew = if filter.jumps_s.len() > jumps { filter.anew } else { 0 };
-        steps.push(Step { time_s, transition, predicted, known: (filter.s, filter.p), anew });
+        steps.push(Step { time_s, transition, updates, known: Known::of(time_s, &filter) });
     }
     // Where jumps hold more poses than not, what the filter makes of them is no motion.
     let jumps = filter.jumps_s.len();
     if 2 * JUMP_POSES * jumps > poses.time_s.len() && jumps > 1 {
         return Err(StateError::Contradicted { jumps, poses: poses.time_s.len() });
     }
+    if steps.is_empty() {
+        return Err(StateError::NothingMeasured);
+    }
     back(&mut steps)?;
-    let last = steps.last().ok_or(StateError::NothingMeasured)?;
-    let of = |i: usize| (last.known.0[i], last.known.1[(i, i)].max(0.0).sqrt());
+    let of = |i: usize| (filter.s[i], filter.p[(i, i)].max(0.0).sqrt());
     let times: Vec<f64> = sequence.time_s.iter().map(|&t| f64::from(t)).collect();
     let motion = times
         .iter()
         .map(|&t| {
             let k = steps.partition_point(|s| s.time_s < t - 1e-6).min(steps.len() - 1);
-            let mut motion = Motion::of(t, &steps[k].known.0, &steps[k].known.1);
+            let mut motion = Motion { time_s: t, ..steps[k].known.motion };
             if poses.time_s.is_empty() {
                 // Without a pose nothing tells where the inertial unit sits, and v_y is that of its place: what the filter makes of the products
                 // of unknowns is not knowledge.
@@ -147,37 +161,57 @@ fn begin(filter: &mut Filter, sequence: &StateSequence, poses: &gripsight_signal
     }
 }
 
-/// The Rauch-Tung-Striebel pass: from the last step to the first.
+/// The modified Bryson-Frazier pass, from the last step to the first: what all that comes later says of the state, as the adjoint lambda and its
+/// information Lambda, goes back through every update and transition; x - P lambda and P - P Lambda P are the smoothed state and its covariance.
+/// The same as Rauch, Tung and Striebel's pass, without the inverse of a covariance at every step.
 fn back(steps: &mut [Step]) -> Result<(), StateError> {
-    for k in (0..steps.len().saturating_sub(1)).rev() {
-        let (early, late) = steps.split_at_mut(k + 1);
-        let (here, next) = (&mut early[k], &late[0]);
-        let mut cross = here.known.1 * next.transition.transpose();
-        // What lies beyond a jump says nothing of place and heading before it.
-        cross.columns_mut(0, next.anew).fill(0.0);
-        let mut predicted = next.predicted.1;
-        let mut later = next.known;
-        for i in 0..next.anew {
-            for j in 0..crate::state::N {
-                if i != j {
-                    predicted[(i, j)] = 0.0;
-                    predicted[(j, i)] = 0.0;
-                    later.1[(i, j)] = 0.0;
-                    later.1[(j, i)] = 0.0;
-                }
+    let (mut adjoint, mut information) = (Vector::zeros(), Matrix::zeros());
+    for step in steps.iter_mut().rev() {
+        let Known { motion, rows } = &mut step.known;
+        let by = *rows * adjoint;
+        let covariance = *rows * information * rows.transpose();
+        motion.v_x_mps -= by[0];
+        motion.v_y_mps -= by[1];
+        motion.yaw_rate_radps -= by[2];
+        for i in 0..3 {
+            for j in 0..3 {
+                motion.covariance[i][j] -= covariance[(i, j)];
             }
-            later.0[i] = next.predicted.0[i];
-            later.1[(i, i)] = predicted[(i, i)];
         }
-        let Some(cholesky) = predicted.cholesky() else {
-            return Err(StateError::Diverged { time_s: next.time_s });
-        };
-        let gain = cholesky.solve(&cross.transpose()).transpose();
-        let s = here.known.0 + gain * (later.0 - next.predicted.0);
-        let p = here.known.1 + gain * (later.1 - predicted) * gain.transpose();
-        here.known = (s, (p + p.transpose()) * 0.5);
+        if !(by.iter().chain(covariance.iter()).all(|v| v.is_finite())) {
+            return Err(StateError::Diverged { time_s: step.time_s });
+        }
+        for update in step.updates.iter().rev() {
+            before(update, &mut adjoint, &mut information);
+        }
+        adjoint = step.transition.tr_mul(&adjoint);
+        information = between(&information, &step.transition);
     }
     Ok(())
+}
+
+/// Takes adjoint and information from after an update to before it.
+fn before(update: &Update, adjoint: &mut Vector, information: &mut Matrix) {
+    match update {
+        Update::One { h, gain, innovation, variance } => {
+            let told = *information * gain;
+            *adjoint -= h * (gain.dot(adjoint) + innovation / variance);
+            let own = h * (gain.dot(&told) + 1.0 / variance) - told;
+            *information += own * h.transpose() - h * told.transpose();
+        }
+        Update::Pose(pose) => {
+            let told = *information * pose.gain;
+            *adjoint -= pose.h.tr_mul(&(pose.gain.tr_mul(adjoint) + pose.inverse * pose.innovation));
+            let own = pose.h.tr_mul(&(pose.gain.tr_mul(&told) + pose.inverse)) - told;
+            *information += own * pose.h - pose.h.tr_mul(&told.transpose());
+        }
+        // What lies beyond a jump says nothing of what began anew there.
+        Update::Anew(states) => {
+            adjoint.rows_mut(0, *states).fill(0.0);
+            information.rows_mut(0, *states).fill(0.0);
+            information.columns_mut(0, *states).fill(0.0);
+        }
+    }
 }
 
 /// The sequence with v_y (and v_x and yaw rate where nothing measures them) as the smoother gives them.
@@ -194,4 +228,82 @@ pub fn filled(sequence: &StateSequence, smoothed: &Smoothed) -> StateSequence {
         out.yaw_rate_radps = column(&|m| m.yaw_rate_radps);
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+
+    use rand::SeedableRng as _;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution as _, Normal};
+
+    use super::*;
+
+    /// Five seconds of a car that weaves, seen by noisy sensors.
+    fn weaving() -> StateSequence {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        // Within two standard deviations: nothing is to be left out.
+        let normal = Normal::new(0.0_f64, 1.0).unwrap();
+        let mut noisy =
+            |value: f64, sigma: f64| (value + sigma * normal.sample(&mut random).clamp(-2.0, 2.0)) as f32;
+        let mut s = StateSequence::default();
+        let (mut x, mut y, mut yaw) = (0.0_f64, 0.0_f64, 0.0_f64);
+        for k in 0..500 {
+            let t = f64::from(k) * 0.01;
+            let (v, r) = (5.0 + (0.5 * t).sin(), (2.0 * t).sin());
+            s.time_s.push(t as f32);
+            s.v_x_mps.push(noisy(v, 0.02));
+            s.v_y_mps.push(0.0);
+            s.yaw_rate_radps.push(noisy(r, 0.01));
+            s.steering_rad.push(0.0);
+            s.a_x_mps2.push(noisy(0.5 * (0.5 * t).cos(), 0.2));
+            s.a_y_mps2.push(noisy(v * r, 0.2));
+            if k % 3 == 0 {
+                s.pose_time_s.push(t as f32);
+                s.pose_x_m.push(noisy(x, 0.02));
+                s.pose_y_m.push(noisy(y, 0.02));
+                s.pose_yaw_rad.push(noisy(yaw, 0.01));
+            }
+            x += v * yaw.cos() * 0.01;
+            y += v * yaw.sin() * 0.01;
+            yaw += r * 0.01;
+        }
+        s
+    }
+
+    /// Where nothing contradicts, the pass gives what Rauch, Tung and Striebel's does (AIAA Journal 3 (1965), 1445-1450).
+    #[test]
+    fn the_way_back_is_the_smoother_of_rauch_tung_and_striebel() {
+        let sequence = weaving();
+        let smoothed = smooth(&sequence).unwrap();
+        assert_eq!((smoothed.left_out, smoothed.jumps_s.len()), (0, 0));
+
+        let poses = sequence.poses();
+        let mut filter = Filter::new(smoothed.levels);
+        begin(&mut filter, &sequence, &poses);
+        let delay_s = pose_delay_s(&sequence, &poses).map_or(0.0, |d| d.0);
+        let mut forward: Vec<(f64, Matrix, [(Vector, Matrix); 2])> = Vec::new();
+        for (time_s, observation) in events(&sequence, &poses, delay_s) {
+            let transition = filter.advance(time_s);
+            let predicted = (filter.s, filter.p);
+            filter.observe(&observation, &mut |_| ());
+            forward.push((time_s, transition, [predicted, (filter.s, filter.p)]));
+        }
+        let mut later = (filter.s, filter.p);
+        for k in (0..forward.len()).rev() {
+            if let Some((_, transition, [(s, p), _])) = forward.get(k + 1) {
+                let known = forward[k].2[1];
+                let gain = known.1 * transition.transpose() * p.try_inverse().unwrap();
+                later = (known.0 + gain * (later.0 - s), known.1 + gain * (later.1 - p) * gain.transpose());
+            }
+            let motion = Motion::of(forward[k].0, &later.0, &later.1);
+            let at = smoothed.motion.iter().find(|m| (m.time_s - motion.time_s).abs() < 1e-6);
+            let Some(at) = at else { continue };
+            approx::assert_abs_diff_eq!(at.v_x_mps, motion.v_x_mps, epsilon = 1e-5);
+            approx::assert_abs_diff_eq!(at.v_y_mps, motion.v_y_mps, epsilon = 1e-5);
+            approx::assert_abs_diff_eq!(at.yaw_rate_radps, motion.yaw_rate_radps, epsilon = 1e-5);
+            approx::assert_relative_eq!(at.v_y_sigma_mps(), motion.v_y_sigma_mps(), max_relative = 1e-4);
+        }
+    }
 }
