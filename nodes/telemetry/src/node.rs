@@ -38,7 +38,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
     let first_s = node.parameter(
         "first_s",
         0.0,
-        Descriptor::new("Length from which the first window is given out while it grows, again every half of that [s]; 0: once it is full")
+        Descriptor::new("Length from which the first window is given out while it grows, again a quarter longer each time [s]; 0: once it is full")
             .range(0.0..=3600.0)
             .read_only(),
     )?;

@@ -14,8 +14,8 @@ use gripsight_vehicle::{GRAVITY_MPS2, PacejkaParameters, VehicleParameters};
 
 /// Longest telemetry to identify from, and shortest.
 const WINDOW_S: (f64, f64) = (30.0, 8.0);
-/// A window that grows is looked at again after so long, as `telemetry` gives it out (`first_s` of `params/suite.yaml`, and every half of that).
-const GROWTH_S: f64 = 4.0;
+/// A window that grows is looked at again when it is so much longer, as `telemetry` gives it out (`first_s` of `params/suite.yaml`).
+const GROWTH: f64 = 1.25;
 
 /// How the reason begins that tells of another road.
 const CHANGED: &str = "the grip has changed";
@@ -92,7 +92,7 @@ impl Learner {
     pub(crate) fn is_due(&mut self) -> bool {
         let due = self.due_s < WINDOW_S.0 && self.span_s() >= self.due_s;
         if due {
-            self.due_s += GROWTH_S;
+            self.due_s *= GROWTH;
         }
         due
     }
