@@ -13,7 +13,7 @@ use crate::tires::SteeringTable;
 use crate::{Longitudinal, Track};
 
 /// Share of the tires' longitudinal limit to plan with: rolling loads and the speed controller need the rest.
-const LONGITUDINAL_SHARE: f64 = 0.95;
+const LONGITUDINAL_SHARE: f64 = 0.9;
 
 /// Turns, in wheelbases over radius: the last one is tighter than cars turn.
 const TURNS: usize = 17;
