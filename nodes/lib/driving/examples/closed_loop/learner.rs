@@ -118,7 +118,7 @@ impl Learner {
         self.told_changed += u32::from(outcome.reasons.iter().any(|reason| reason.starts_with(CHANGED)));
         if verbose {
             eprintln!(
-                "  {}: D {:.3} {:.3} found {:.3} {:.3} reached {} {} delay {:.3} {}",
+                "  {}: D {:.3} {:.3} found {:.3} {:.3} reached {} {} delay {:.3} {} {}",
                 outcome.status.name(),
                 outcome.phi_p.front.d,
                 outcome.phi_p.rear.d,
@@ -130,6 +130,7 @@ impl Learner {
                 outcome
                     .provisional
                     .map_or(String::new(), |p| format!("prior {:.3} {:.3}", p.phi_p.front.d, p.phi_p.rear.d)),
+                outcome.reasons.join("; "),
             );
         }
         // As the identifier does: one that was withdrawn stands in nobody's way.
