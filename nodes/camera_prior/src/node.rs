@@ -29,14 +29,21 @@ const SETTLE: Duration = Duration::from_millis(50);
 /// Declares parameters and topics; gives the node's work.
 pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyhow::Result<()>> + use<>> {
     let configuration = settings::declare(node)?;
-    let no_network = configuration.network.as_ref().err().map(ToString::to_string);
+    let no_network = configuration.models.as_ref().err().map(ToString::to_string);
     if let Some(why) = &no_network {
         tracing::error!("the configured friction stands, there is no network: {why}");
     }
     let wanted = configuration.input;
-    let network = configuration.network.ok().flatten();
-    let configured = network.is_none();
+    let models = configuration.models.ok().flatten();
+    let configured = models.is_none();
+    let (network, embedder) = models.map(|models| (models.network, models.embedder)).unzip();
     let mut estimator = FrictionEstimator::new(configuration.settings, configuration.basis, network);
+    // It serves what a track teaches, and costs more than the network.
+    if let Some(embedder) = embedder
+        && (configuration.learning.wanted || configuration.calibration.is_some())
+    {
+        estimator = estimator.with_embedder(embedder);
+    }
     let learner = Learner::new(configuration.calibration.as_ref());
     estimator.calibrate(configuration.calibration);
     let pictures = node.sensor_qos(2).with_depth(2);

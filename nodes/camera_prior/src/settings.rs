@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use gripsight_friction::{
-    Basis, Calibration, FilterSettings, FrictionError, Look, ModelLimits, Network, OnnxRuntime, Prior,
-    QualityLimits, Settings, TransportLimits, find_library, find_model,
+    Basis, Calibration, Embedder, FilterSettings, FrictionError, Look, ModelLimits, Network, OnnxEmbedder,
+    OnnxRuntime, Prior, QualityLimits, Settings, TransportLimits, find_embedding, find_library, find_model,
 };
 use gripsight_runtime::{Descriptor, Node};
 
@@ -13,14 +13,20 @@ use gripsight_runtime::{Descriptor, Node};
 pub(crate) struct Configuration {
     pub(crate) settings: Settings,
     pub(crate) basis: Basis,
-    /// The network, or why there is none; none is wanted without an input.
-    pub(crate) network: Result<Option<Box<dyn Network>>, FrictionError>,
+    /// The models, or why there are none; none are wanted without an input.
+    pub(crate) models: Result<Option<Models>, FrictionError>,
     /// Picture topics to subscribe to: `both`, `raw`, `compressed` or `none`.
     pub(crate) input: String,
     pub(crate) publish_region: bool,
     /// What the track has taught before.
     pub(crate) calibration: Option<Calibration>,
     pub(crate) learning: Learning,
+}
+
+/// What reads pictures.
+pub(crate) struct Models {
+    pub(crate) network: Box<dyn Network>,
+    pub(crate) embedder: Box<dyn Embedder>,
 }
 
 /// How the node learns from the tires.
@@ -189,11 +195,11 @@ pub(crate) fn declare(node: &mut Node) -> anyhow::Result<Configuration> {
     let input = node.parameter("input", String::from("both"), input)?.get();
     let program = std::env::current_exe()?;
     let beside = program.parent().unwrap_or(Path::new("."));
-    let network = match input.as_str() {
+    let models = match input.as_str() {
         "none" => Ok(None),
-        _ => network(library.as_deref(), model.as_deref(), beside).map(Some),
+        _ => models(library.as_deref(), model.as_deref(), beside).map(Some),
     };
-    Ok(Configuration { settings, basis, network, input, publish_region, calibration, learning })
+    Ok(Configuration { settings, basis, models, input, publish_region, calibration, learning })
 }
 
 /// What the track has taught before, and how it goes on. A track's own file comes before the one that `calibration` names.
@@ -236,12 +242,12 @@ fn usual_folder() -> Option<PathBuf> {
     Some(data.join("gripsight/tracks"))
 }
 
-fn network(
-    library: Option<&Path>,
-    model: Option<&Path>,
-    beside: &Path,
-) -> Result<Box<dyn Network>, FrictionError> {
-    Ok(Box::new(OnnxRuntime::load(&find_library(library, beside)?, &find_model(model, beside)?)?))
+fn models(library: Option<&Path>, model: Option<&Path>, beside: &Path) -> Result<Models, FrictionError> {
+    let library = find_library(library, beside)?;
+    Ok(Models {
+        network: Box::new(OnnxRuntime::load(&library, &find_model(model, beside)?)?),
+        embedder: Box::new(OnnxEmbedder::load(&library, &find_embedding(beside)?)?),
+    })
 }
 
 /// A parameter that names a file; an empty text names none.

@@ -7,8 +7,8 @@ use anyhow::{Context, bail};
 use clap::Args;
 use gripsight_bag::{Bag, TopicMap, decode, from_cdr};
 use gripsight_friction::{
-    Basis, Calibration, Estimate, Frame, FrameData, FrictionEstimator, Look, Motion, Odometer, OnnxRuntime,
-    RawPicture, Settings, find_library, find_model,
+    Basis, Calibration, Estimate, Frame, FrameData, FrictionEstimator, Look, Motion, Odometer, OnnxEmbedder,
+    OnnxRuntime, RawPicture, Settings, find_embedding, find_library, find_model,
 };
 use gripsight_identification::FrictionPrior;
 use gripsight_msgs::Message;
@@ -57,7 +57,9 @@ impl CameraArgs {
         let model = find_model(self.model.as_deref(), folder)?;
         let network = OnnxRuntime::load(&library, &model)?;
         let settings = Settings { region: self.region, ..Settings::default() };
-        let mut estimator = FrictionEstimator::new(settings, basis, Some(Box::new(network)));
+        let embedder = OnnxEmbedder::load(&library, &find_embedding(folder)?)?;
+        let mut estimator = FrictionEstimator::new(settings, basis, Some(Box::new(network)))
+            .with_embedder(Box::new(embedder));
         estimator.calibrate(calibration);
         Ok(estimator)
     }

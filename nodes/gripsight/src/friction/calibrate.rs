@@ -153,9 +153,9 @@ fn example(
     friction: FloorFriction,
 ) -> Option<Example> {
     let quality = estimate.reason.filter(|r| r.is_of_the_picture());
-    match (estimate.appearance, quality) {
+    match (&estimate.appearance, quality) {
         (Some(appearance), None) => Some(Example {
-            appearance: appearance.to_vec(),
+            appearance: appearance.clone(),
             mu: friction.mu,
             sigma: friction.sigma,
             source: source.to_owned(),

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use gripsight_friction::{
-    Basis, Frame, FrameData, FrictionEstimator, OnnxRuntime, RawPicture, Region, Settings, decode,
-    find_library, find_model,
+    Basis, Frame, FrameData, FrictionEstimator, OnnxEmbedder, OnnxRuntime, RawPicture, Region, Settings,
+    decode, find_embedding, find_library, find_model,
 };
 use image::codecs::jpeg::JpegEncoder;
 use image::{RgbImage, imageops};
@@ -25,8 +25,11 @@ fn road() -> Result<RgbImage, Box<dyn Error>> {
 
 fn estimator() -> Result<FrictionEstimator, Box<dyn Error>> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let network = OnnxRuntime::load(&find_library(None, here)?, &find_model(None, here)?)?;
-    Ok(FrictionEstimator::new(Settings::default(), Basis::builtin()?, Some(Box::new(network))))
+    let library = find_library(None, here)?;
+    let network = OnnxRuntime::load(&library, &find_model(None, here)?)?;
+    let embedder = OnnxEmbedder::load(&library, &find_embedding(here)?)?;
+    let estimator = FrictionEstimator::new(Settings::default(), Basis::builtin()?, Some(Box::new(network)));
+    Ok(estimator.with_embedder(Box::new(embedder)))
 }
 
 fn frames(criterion: &mut Criterion) -> Result<(), Box<dyn Error>> {

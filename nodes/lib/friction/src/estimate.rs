@@ -1,6 +1,5 @@
 //! What the pipeline says: a prior, where it comes from, and why it is not usable.
 
-use crate::appearance::APPEARANCE;
 use crate::calibration::Known;
 use crate::error::FrictionError;
 use crate::quality::QualityStatistics;
@@ -112,8 +111,9 @@ pub struct Estimate {
     pub unfamiliarity: Option<f64>,
     /// Statistics of the newest picture's region of interest.
     pub quality: Option<QualityStatistics>,
-    /// What the newest picture's region looks like; none where no picture could be read.
-    pub appearance: Option<[f64; APPEARANCE.len()]>,
+    /// What the newest picture's region looks like: [`appearance`](crate::appearance), and the embedding after it where there is one; of a picture at most a
+    /// metre before where there is. None where no picture could be read.
+    pub appearance: Option<Vec<f64>>,
     /// What the network alone says of the newest picture; none where it was not asked, or is not believed.
     pub network_mu: Option<f64>,
     /// What the calibration says of it; none without one.

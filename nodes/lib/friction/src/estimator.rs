@@ -1,12 +1,14 @@
 //! The whole pipeline: a frame in, a friction prior out.
 
-use crate::appearance::{APPEARANCE, appearance};
+use crate::appearance::appearance;
 use crate::basis::{Basis, Prior};
 use crate::calibration::{Calibration, Known};
 use crate::decode::decode;
+use crate::embedding::{EMBEDDING_SIDE, Embedder};
 use crate::error::FrictionError;
 use crate::estimate::{Estimate, Reason, Source};
 use crate::filter::DistanceFilter;
+use crate::learner::is_near;
 use crate::look::{Look, RoadFinder};
 use crate::network::{Answer, Network};
 use crate::picture::{Frame, FrameData, Region, RgbPicture};
@@ -32,7 +34,17 @@ pub struct FrictionEstimator {
     filter: DistanceFilter,
     finder: RoadFinder,
     calibration: Option<Calibration>,
+    embedder: Option<Box<dyn Embedder>>,
     seen: Option<RgbPicture>,
+    sight: Option<Sight>,
+}
+
+/// What a picture looks like, and what the track has taught of it: it stands for the next metre.
+struct Sight {
+    stamp_ns: i64,
+    distance_m: Option<f64>,
+    appearance: Vec<f64>,
+    known: Option<Known>,
 }
 
 impl std::fmt::Debug for FrictionEstimator {
@@ -49,7 +61,7 @@ struct Reading {
     energy: f64,
     unfamiliarity: Option<f64>,
     quality: QualityStatistics,
-    appearance: [f64; APPEARANCE.len()],
+    appearance: Option<Vec<f64>>,
     network_mu: Option<f64>,
     known: Option<Known>,
     refused: Option<Reason>,
@@ -68,13 +80,22 @@ impl FrictionEstimator {
             filter: DistanceFilter::default(),
             finder: RoadFinder::default(),
             calibration: None,
+            embedder: None,
             seen: None,
+            sight: None,
         }
+    }
+
+    /// Calibrations compare by this embedding, too.
+    #[must_use]
+    pub fn with_embedder(mut self, embedder: Box<dyn Embedder>) -> Self {
+        self.embedder = Some(embedder);
+        self
     }
 
     /// Takes what a track has taught; none leaves the network alone.
     pub fn calibrate(&mut self, calibration: Option<Calibration>) {
-        self.calibration = calibration;
+        (self.calibration, self.sight) = (calibration, None);
     }
 
     /// What the track has taught.
@@ -94,6 +115,7 @@ impl FrictionEstimator {
         self.transport = TransportGate::default();
         self.filter = DistanceFilter::default();
         self.finder = RoadFinder::default();
+        self.sight = None;
     }
 
     /// The last region of interest as the network saw it.
@@ -125,7 +147,7 @@ impl FrictionEstimator {
         if let Some(reason) = late {
             return self.refuse(stamp, reason, None);
         }
-        let reading = match self.read(frame) {
+        let reading = match self.read(frame, motion.distance_m) {
             Ok(reading) => reading,
             Err(error) => return self.refuse(stamp, Reason::of_error(&error), Some(error.to_string())),
         };
@@ -134,7 +156,7 @@ impl FrictionEstimator {
             estimate.energy = reading.energy;
             estimate.unfamiliarity = reading.unfamiliarity;
             estimate.quality = Some(reading.quality);
-            estimate.appearance = Some(reading.appearance);
+            estimate.appearance.clone_from(&reading.appearance);
             estimate.network_mu = reading.network_mu;
             estimate.known = reading.known;
             estimate
@@ -176,11 +198,9 @@ impl FrictionEstimator {
     }
 
     /// Decode, look, ask the network and the calibration.
-    fn read(&mut self, frame: &Frame<'_>) -> Result<Reading, FrictionError> {
-        let crop = self.crop(&frame.data)?;
-        let input = self.seen.insert(self.preprocessor.resize(&crop)?);
-        let quality = QualityStatistics::measure(input);
-        let appearance = appearance(input, self.finder.scene());
+    fn read(&mut self, frame: &Frame<'_>, distance_m: Option<f64>) -> Result<Reading, FrictionError> {
+        let (crop, region) = self.crop(&frame.data)?;
+        let quality = QualityStatistics::measure(self.seen.insert(self.preprocessor.resize(&crop)?));
         let mut reading = Reading {
             p: self.flat(),
             prior: self.basis.uninformative,
@@ -188,19 +208,47 @@ impl FrictionEstimator {
             energy: 0.0,
             unfamiliarity: None,
             quality,
-            appearance,
+            appearance: None,
             network_mu: None,
             known: None,
             refused: self.settings.quality.check(&quality),
         };
         if reading.refused.is_none() {
-            reading.known = self.calibration.as_ref().map(|c| c.read(&appearance));
+            let sight = self.sight(frame, distance_m, region)?;
+            (reading.appearance, reading.known) = (Some(sight.appearance.clone()), sight.known);
             self.ask(&mut reading)?;
         }
         Ok(reading)
     }
 
-    fn crop(&mut self, data: &FrameData<'_>) -> Result<RgbPicture, FrictionError> {
+    /// What the road in a region looks like here: embedded once a metre, as an embedding costs more than all else.
+    fn sight(
+        &mut self,
+        frame: &Frame<'_>,
+        distance_m: Option<f64>,
+        region: Region,
+    ) -> Result<&Sight, FrictionError> {
+        let stamp_ns = frame.stamp_ns;
+        let here = (stamp_ns, distance_m);
+        let near = self.sight.take().filter(|last| is_near(here, (last.stamp_ns, last.distance_m)));
+        let sight = match (near, &mut self.embedder, &self.seen) {
+            (Some(last), Some(_), _) => last,
+            (_, embedder, Some(input)) => {
+                let mut appearance = appearance(input, self.finder.scene()).to_vec();
+                if let Some(embedder) = embedder {
+                    let around = decode(&frame.data, &self.settings.region.around(region))?;
+                    let small = self.preprocessor.resize_to(&around, EMBEDDING_SIDE)?;
+                    appearance.extend(embedder.embed(&normalise(&small))?);
+                }
+                let known = self.calibration.as_ref().map(|c| c.read(&appearance));
+                Sight { stamp_ns, distance_m, appearance, known }
+            }
+            (_, _, None) => Sight { stamp_ns, distance_m, appearance: Vec::new(), known: None },
+        };
+        Ok(self.sight.insert(sight))
+    }
+
+    fn crop(&mut self, data: &FrameData<'_>) -> Result<(RgbPicture, Region), FrictionError> {
         let whole = match self.finder.wants_a_look() {
             true => Some(decode(data, &Region::WHOLE)?),
             false => None,
@@ -211,7 +259,8 @@ impl FrictionEstimator {
             Look::At(region) => region,
             Look::Auto => found,
         };
-        whole.map_or_else(|| decode(data, &region), |whole| Ok(whole.crop(&region)))
+        let crop = whole.map_or_else(|| decode(data, &region), |whole| Ok(whole.crop(&region)));
+        Ok((crop?, region))
     }
 
     /// Fills in what the network says, and joins it with what the calibration does.

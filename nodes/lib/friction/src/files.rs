@@ -8,8 +8,9 @@ use crate::error::FrictionError;
 
 /// The library's file names: the plain one, and the versioned one that a bare wheel unpacks to.
 const LIBRARY: &str = "libonnxruntime.so";
-/// The trained network's file name.
+/// The trained network's file name, and that of the embedding.
 const MODEL: &str = "road_mobilenet_v3_small.onnx";
+const EMBEDDING: &str = "embedding_efficientnet_lite0.onnx";
 
 /// The ONNX Runtime library: `explicit`, else beside the program, else `.deps/onnxruntime` in any folder above it.
 ///
@@ -28,12 +29,24 @@ pub fn find_library(explicit: Option<&Path>, program_folder: &Path) -> Result<Pa
 /// # Errors
 /// [`FrictionError::NotFound`] with the places looked at.
 pub fn find_model(explicit: Option<&Path>, program_folder: &Path) -> Result<PathBuf, FrictionError> {
-    let beside = [program_folder.join(MODEL)];
-    let above = program_folder.ancestors().flat_map(|a| {
+    find("model", explicit, places_of(MODEL, program_folder))
+}
+
+/// The embedding, in the same places.
+///
+/// # Errors
+/// [`FrictionError::NotFound`] with the places looked at.
+pub fn find_embedding(program_folder: &Path) -> Result<PathBuf, FrictionError> {
+    find("embedding model", None, places_of(EMBEDDING, program_folder))
+}
+
+fn places_of<'a>(file: &'a str, program_folder: &'a Path) -> impl Iterator<Item = PathBuf> + 'a {
+    let beside = [program_folder.join(file)];
+    let above = program_folder.ancestors().flat_map(move |a| {
         ["share/gripsight_camera_prior/model", "nodes/camera_prior/model"]
-            .map(|place| a.join(place).join(MODEL))
+            .map(|place| a.join(place).join(file))
     });
-    find("model", explicit, beside.into_iter().chain(above))
+    beside.into_iter().chain(above)
 }
 
 /// No picture, basis or calibration is larger (bytes).

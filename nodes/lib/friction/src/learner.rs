@@ -2,7 +2,6 @@
 
 use std::collections::VecDeque;
 
-use crate::appearance::APPEARANCE;
 use crate::calibration::{Calibration, Example, FloorFriction};
 use crate::error::FrictionError;
 use crate::estimate::Estimate;
@@ -20,13 +19,21 @@ const MOST_EXAMPLES: usize = 160;
 const HARD: f64 = 0.5;
 const GRAVITY_MPS2: f64 = 9.81;
 
+/// Whether two pictures, each at a stamp and a distance, show the same metre of road.
+pub(crate) fn is_near(now: (i64, Option<f64>), then: (i64, Option<f64>)) -> bool {
+    match now.1.zip(then.1) {
+        Some((now_m, then_m)) => (now_m - then_m).abs() < STEP_M,
+        None => (now.0 - then.0).abs() < STEP_NS,
+    }
+}
+
 /// A picture on its way to a label.
 #[derive(Debug, Clone)]
 struct Sighting {
     stamp_ns: i64,
     distance_m: Option<f64>,
     lateral_mps2: f64,
-    appearance: [f64; APPEARANCE.len()],
+    appearance: Vec<f64>,
     network_mu: Option<f64>,
 }
 
@@ -57,7 +64,9 @@ impl Learner {
 
     /// Takes in a picture's reading, seen after `distance_m` of travel at a lateral acceleration of `lateral_mps2`.
     pub fn see(&mut self, estimate: &Estimate, distance_m: Option<f64>, lateral_mps2: f64) {
-        let (Some(stamp_ns), Some(appearance)) = (estimate.stamp_ns, estimate.appearance) else { return };
+        let (Some(stamp_ns), Some(appearance)) = (estimate.stamp_ns, estimate.appearance.clone()) else {
+            return;
+        };
         if estimate.reason.is_some_and(|r| r.is_of_the_picture()) {
             return;
         }
@@ -66,11 +75,7 @@ impl Learner {
                 // A clock set back: nothing of before belongs to what comes.
                 self.sightings.clear();
             } else {
-                let near = match distance_m.zip(last.distance_m) {
-                    Some((now, then)) => (now - then).abs() < STEP_M,
-                    None => stamp_ns - last.stamp_ns < STEP_NS,
-                };
-                if near {
+                if is_near((stamp_ns, distance_m), (last.stamp_ns, last.distance_m)) {
                     last.lateral_mps2 = last.lateral_mps2.max(lateral_mps2.abs());
                     return;
                 }
@@ -99,7 +104,7 @@ impl Learner {
         let stride = seen.len().div_ceil(PICTURES_A_LESSON).max(1);
         let before = self.examples.len();
         self.examples.extend(seen.iter().step_by(stride).map(|s| Example {
-            appearance: s.appearance.to_vec(),
+            appearance: s.appearance.clone(),
             mu: lesson.friction.mu,
             sigma: lesson.friction.sigma,
             source: lesson.name.clone(),
@@ -160,7 +165,7 @@ mod tests {
             energy: 0.0,
             unfamiliarity: None,
             quality: None,
-            appearance: Some(crate::appearance::LEAST_SCALE.map(|s| s * look)),
+            appearance: Some(crate::appearance::LEAST_SCALE.map(|s| s * look).to_vec()),
             network_mu: Some(0.8),
             known: None,
             distance_m: 0.0,

@@ -24,6 +24,7 @@ mod basis;
 mod bayer;
 mod calibration;
 mod decode;
+mod embedding;
 mod error;
 mod estimate;
 mod estimator;
@@ -47,10 +48,11 @@ pub use calibration::{
     Calibration, Errors, Example, FloorFriction, Kernel, Known, NETWORK_ERROR, floor_friction,
 };
 pub use decode::decode;
+pub use embedding::{EMBEDDED, EMBEDDING_SIDE, Embedder, OnnxEmbedder};
 pub use error::FrictionError;
 pub use estimate::{Estimate, Reason, Source};
 pub use estimator::{FrictionEstimator, Motion};
-pub use files::{find_library, find_model, read_picture};
+pub use files::{find_embedding, find_library, find_model, read_picture};
 pub use filter::{DistanceFilter, FilterSettings};
 pub use learner::{Learner, Lesson};
 pub use look::Look;

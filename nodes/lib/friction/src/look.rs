@@ -23,6 +23,9 @@ const ALIKE: [f64; 3] = [3.5, 2.5, 2.5];
 const LEAST_SPREAD: [f64; 3] = [18.0, 6.0, 6.0];
 /// The horizon of a whole frame where the colour tells none.
 const USUAL_HORIZON: f64 = 0.5;
+/// Share of the way from the horizon that is too far away, and that over the rest.
+const FAR: f64 = 0.3;
+const FAR_OVER_NEAR: f64 = FAR / (1.0 - FAR);
 /// Pictures of a stream between two looks, and looks of which the middle counts.
 const PICTURES_A_LOOK: u32 = 10;
 const LOOKS: usize = 5;
@@ -35,6 +38,17 @@ pub enum Look {
     Auto,
     /// Always this one.
     At(Region),
+}
+
+impl Look {
+    /// What to embed beside a road found in `road`: its verges and what lies at its end, which tell of snow and rain as much as the road does. A part that
+    /// was stated stays alone.
+    pub(crate) fn around(&self, road: Region) -> Region {
+        match self {
+            Self::Auto => road.around(FAR_OVER_NEAR),
+            Self::At(region) => *region,
+        }
+    }
 }
 
 impl FromStr for Look {
@@ -184,7 +198,7 @@ fn find(cells: &[[f64; 3]]) -> [f64; 4] {
     let horizon = if share(top) < 0.25 { USUAL_HORIZON } else { share(top).min(0.6) };
     let depth = share(bottom) - horizon;
     // Far away a pixel shows metres of road, and beside it lies what is no road.
-    [0.25, horizon + 0.3 * depth, 0.75, share(bottom) - 0.02]
+    [0.25, horizon + FAR * depth, 0.75, share(bottom) - 0.02]
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

@@ -1,5 +1,6 @@
 //! The network: a tensor in, one logit per road state out, and how unlike its training pictures the picture is.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 use std::sync::Mutex;
 
@@ -48,12 +49,22 @@ impl OnnxRuntime {
     /// # Errors
     /// [`FrictionError::Library`] or [`FrictionError::Model`].
     pub fn load(library: &Path, model: &Path) -> Result<Self, FrictionError> {
-        let environment = environment(library)
-            .map_err(|message| FrictionError::Library { path: library.to_path_buf(), message })?;
-        let session = open(&environment, model)
-            .map_err(|message| FrictionError::Model { path: model.to_path_buf(), message })?;
-        Ok(Self { session })
+        Ok(Self { session: session(library, model, INPUT_SIDE, 1..=2, MOST_OUTPUTS)? })
     }
+}
+
+/// Loads the library and a model of one square picture with so many outputs of so many numbers at most.
+pub(crate) fn session(
+    library: &Path,
+    model: &Path,
+    side: u32,
+    outputs: RangeInclusive<usize>,
+    most: i64,
+) -> Result<Session, FrictionError> {
+    let environment = environment(library)
+        .map_err(|message| FrictionError::Library { path: library.to_path_buf(), message })?;
+    open(&environment, model, side, outputs, most)
+        .map_err(|message| FrictionError::Model { path: model.to_path_buf(), message })
 }
 
 /// ONNX Runtime allows one environment per process, so it is kept.
@@ -69,7 +80,13 @@ fn environment(library: &Path) -> Result<Environment, String> {
     Ok(kept.insert(environment).clone())
 }
 
-fn open(environment: &Environment, model: &Path) -> Result<Session, String> {
+fn open(
+    environment: &Environment,
+    model: &Path,
+    side: u32,
+    expected: RangeInclusive<usize>,
+    most: i64,
+) -> Result<Session, String> {
     let text = |e: ort::Error<ort::session::builder::SessionBuilder>| e.to_string();
     let mut builder = Session::builder(environment)
         .map_err(|e| e.to_string())?
@@ -83,16 +100,18 @@ fn open(environment: &Environment, model: &Path) -> Result<Session, String> {
     within(length, MOST_BYTES).map_err(|e| e.to_string())?;
     let session = builder.commit_from_file(model).map_err(|e| e.to_string())?;
     let (inputs, outputs) = (session.inputs(), session.outputs());
-    if inputs.len() != 1 || !(1..=2).contains(&outputs.len()) {
+    if inputs.len() != 1 || !expected.contains(&outputs.len()) {
         return Err(format!(
-            "expected 1 input and 1 or 2 outputs, got {} and {}",
+            "expected 1 input and {} to {} outputs, got {} and {}",
+            expected.start(),
+            expected.end(),
             inputs.len(),
             outputs.len()
         ));
     }
-    let side = i64::from(INPUT_SIDE);
+    let side = i64::from(side);
     takes(&inputs[0], &[1, 3, side, side])?;
-    outputs.iter().try_for_each(gives_few)?;
+    outputs.iter().try_for_each(|output| gives_few(output, most))?;
     Ok(session)
 }
 
@@ -109,12 +128,12 @@ fn takes(input: &Outlet, expected: &[i64]) -> Result<(), String> {
 }
 
 /// Refuses an output that is large by itself.
-fn gives_few(output: &Outlet) -> Result<(), String> {
+fn gives_few(output: &Outlet, most: i64) -> Result<(), String> {
     let shape = floats(output)?;
     let few = shape.iter().try_fold(1_i64, |all, size| all.checked_mul((*size).max(1)));
     match few {
-        Some(..=MOST_OUTPUTS) => Ok(()),
-        _ => Err(format!("output {:.40?}: at most {MOST_OUTPUTS} numbers, got {shape:?}", output.name())),
+        Some(count) if count <= most => Ok(()),
+        _ => Err(format!("output {:.40?}: at most {most} numbers, got {shape:?}", output.name())),
     }
 }
 

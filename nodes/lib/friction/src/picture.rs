@@ -131,6 +131,11 @@ impl Region {
         }
     }
 
+    /// The whole width, and upwards by `up` of its height more.
+    pub(crate) fn around(&self, up: f64) -> Self {
+        Self { left: 0.0, top: (self.top - up * (self.bottom - self.top)).max(0.0), right: 1.0, ..*self }
+    }
+
     /// (left, top, width, height) in whole pixels of a `width` x `height` picture; at least one pixel.
     #[must_use]
     pub fn pixels(&self, width: u32, height: u32) -> (u32, u32, u32, u32) {

@@ -37,15 +37,23 @@ impl Preprocessor {
     /// # Errors
     /// [`FrictionError::Resize`] where the picture's size does not match its data.
     pub fn resize(&mut self, picture: &RgbPicture) -> Result<RgbPicture, FrictionError> {
+        self.resize_to(picture, INPUT_SIDE)
+    }
+
+    /// The same at another size.
+    ///
+    /// # Errors
+    /// As [`Self::resize`].
+    pub fn resize_to(&mut self, picture: &RgbPicture, side: u32) -> Result<RgbPicture, FrictionError> {
         let failed = |message: String| FrictionError::Resize { message };
         // Typed: code for one kind of pixel is compiled, not for all that there are (minutes of it).
         let source = TypedImageRef::<U8x3>::from_buffer(picture.width, picture.height, &picture.data)
             .map_err(|e| failed(e.to_string()))?;
-        let mut data = vec![0; (INPUT_SIDE * INPUT_SIDE * 3) as usize];
-        let mut target = TypedImage::<U8x3>::from_buffer(INPUT_SIDE, INPUT_SIDE, &mut data)
-            .map_err(|e| failed(e.to_string()))?;
+        let mut data = vec![0; (side * side * 3) as usize];
+        let mut target =
+            TypedImage::<U8x3>::from_buffer(side, side, &mut data).map_err(|e| failed(e.to_string()))?;
         self.resizer.resize_typed(&source, &mut target, &self.options).map_err(|e| failed(e.to_string()))?;
-        Ok(RgbPicture { width: INPUT_SIDE, height: INPUT_SIDE, data })
+        Ok(RgbPicture { width: side, height: side, data })
     }
 }
 

@@ -123,7 +123,7 @@ fn taught() -> Calibration {
     let mut e = estimator(&WET);
     let examples: Vec<Example> = (1..9)
         .map(|seed| Example {
-            appearance: at(&mut e, i64::from(seed), raw(&textured(seed)), None).appearance.unwrap().to_vec(),
+            appearance: at(&mut e, i64::from(seed), raw(&textured(seed)), None).appearance.unwrap(),
             mu: 0.35,
             sigma: 0.03,
             source: "drive".into(),

@@ -7,7 +7,8 @@
 use std::path::{Path, PathBuf};
 
 use gripsight_friction::{
-    FrictionError, INPUT_SIDE, Network, OnnxRuntime, Preprocessor, Region, RgbPicture, decode, normalise,
+    EMBEDDED, EMBEDDING_SIDE, Embedder, FrictionError, INPUT_SIDE, Network, OnnxEmbedder, OnnxRuntime,
+    Preprocessor, Region, RgbPicture, decode, normalise,
 };
 
 const HERE: &str = env!("CARGO_MANIFEST_DIR");
@@ -74,6 +75,25 @@ fn assert_golden_answer(network: &mut dyn Network) {
 fn onnx_runtime_gives_the_training_frameworks_answer() {
     let Some(library) = library() else { return };
     assert_golden_answer(&mut OnnxRuntime::load(&library, &model()).unwrap());
+}
+
+#[test]
+fn the_embedding_is_that_of_the_framework_that_it_comes_from() {
+    let Some(library) = library() else { return };
+    let model = gripsight_friction::find_embedding(Path::new(HERE)).unwrap();
+    let small = picture(include_bytes!("golden/embedding.png"), &Region::WHOLE);
+    let got = OnnxEmbedder::load(&library, &model).unwrap().embed(&normalise(&small)).unwrap();
+    let golden: serde_json::Value = serde_json::from_str(include_str!("golden/embedding.json")).unwrap();
+    let want = numbers(&golden["embedding"]);
+    assert_eq!((got.len(), want.len()), (EMBEDDED, EMBEDDED));
+    let worst = got.iter().zip(&want).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(worst < 1e-3, "off by {worst}");
+    let whole = picture(include_bytes!("golden/input.png"), &Region::WHOLE);
+    let resized = Preprocessor::default().resize_to(&whole, EMBEDDING_SIDE).unwrap();
+    let worst = resized.data.iter().zip(&small.data).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
+    assert!(worst <= 1, "off by {worst} levels");
+    // The camera network's model is none.
+    assert!(matches!(OnnxEmbedder::load(&library, &self::model()), Err(FrictionError::Model { .. })));
 }
 
 #[cfg(feature = "tract")]

@@ -6,10 +6,11 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::appearance::APPEARANCE;
+use crate::embedding::EMBEDDED;
 use crate::error::FrictionError;
 use crate::files::read_text;
 
-use super::{Calibration, Errors, Example, Kernel, bad};
+use super::{Calibration, Errors, Example, Kernel, bad, is_known_length};
 
 const SCHEMA: &str = "gripsight.friction_calibration/2";
 
@@ -29,6 +30,12 @@ struct Content {
     pictures: usize,
     examples: Vec<Example>,
     hash: String,
+}
+
+/// Names of the numbers, of which there are so many.
+fn features(count: usize) -> Vec<String> {
+    let named = APPEARANCE.map(str::to_owned).into_iter();
+    named.chain((0..).map(|k| format!("embedding_{k}"))).take(count).collect()
 }
 
 fn hash(track: &str, examples: &[Example]) -> String {
@@ -60,7 +67,7 @@ impl Calibration {
         let content = Content {
             schema: SCHEMA.to_owned(),
             track: self.track.clone(),
-            features: APPEARANCE.map(str::to_owned).to_vec(),
+            features: features(self.mean.len()),
             mean: self.mean.clone(),
             scale: self.scale.clone(),
             kernels: self.process.kernels().collect(),
@@ -83,8 +90,11 @@ impl Calibration {
         if content.schema != SCHEMA {
             return Err(bad(format!("schema {:.40?}: expected {SCHEMA}", content.schema)));
         }
-        if content.features != APPEARANCE {
-            return Err(bad(format!("{} features, or others than {APPEARANCE:?}", content.features.len())));
+        let count = content.features.len();
+        if !is_known_length(count) || content.features != features(count) {
+            return Err(bad(format!(
+                "{count} features, or others than {APPEARANCE:?} and, at most, {EMBEDDED} of the embedding"
+            )));
         }
         // First of all: learning takes its time, and what was changed is not worth it.
         if hash(&content.track, &content.examples) != content.hash {

@@ -2,11 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::appearance::APPEARANCE;
 use crate::error::FrictionError;
 
-use super::process::{Kernel, Mixture, Process, distance2};
-use super::{Calibration, Errors, Example, NETWORK_ERROR, bad, scale_of, scaled};
+use super::process::{Kernel, Mixture, Pairs, Process};
+use super::{Calibration, Errors, Example, NETWORK_ERROR, bad, is_known_length, scale_of, scaled};
 
 /// Pictures from which on there is something to learn.
 const LEAST_EXAMPLES: usize = 3;
@@ -46,13 +45,16 @@ impl Calibration {
                 examples.len()
             )));
         }
+        let numbers = examples[0].appearance.len();
         for e in &examples {
-            let fine = e.appearance.len() == APPEARANCE.len() && e.appearance.iter().all(|x| x.is_finite());
+            let fine = is_known_length(numbers)
+                && e.appearance.len() == numbers
+                && e.appearance.iter().all(|x| x.is_finite());
             if !fine || !(0.01..=3.0).contains(&e.mu) || !(0.0..=1.0).contains(&e.sigma) {
                 return Err(bad(format!(
                     "a picture of {}: expected {} finite numbers, a friction of 0.01 to 3 and a sigma of 0 to 1, got {} numbers, {} and {}",
                     e.source,
-                    APPEARANCE.len(),
+                    numbers,
                     e.appearance.len(),
                     e.mu,
                     e.sigma
@@ -63,23 +65,24 @@ impl Calibration {
         let inputs: Vec<Vec<f64>> = examples.iter().map(|e| scaled(&e.appearance, &mean, &scale)).collect();
         let weights = balanced(&examples);
         let parts = parts(&examples);
+        let pairs = Pairs::of(&inputs);
         let mut scores = vec![];
         for kernel in kernels() {
-            let left_out = process(kernel, &inputs, &examples)?.left_out(&parts);
+            let left_out = process(kernel, &pairs, &examples)?.left_out(&parts);
             scores.push((surprise(&left_out, &weights), kernel));
         }
         let mut members = vec![];
         for (share, kernel) in shares(&scores, parts.len()) {
-            members.push((share, process(kernel, &inputs, &examples)?));
+            members.push((share, process(kernel, &pairs, &examples)?));
         }
-        let process = Mixture::new(members);
+        let process = Mixture::new(inputs, members);
         let left_out = process.left_out(&parts);
         let (known, sigma_factor, within_sigma) = spread(&left_out, &weights, parts.len());
         let sources = grouped(&examples, |e| (e.source.clone(), 0));
         let new_source =
             (sources.len() > 1).then(|| spread(&process.left_out(&sources), &weights, sources.len()).0);
         let errors = Errors { known, network: network_error(&examples, &sources), new_source, within_sigma };
-        let new_distance = new_distance(&inputs, &parts);
+        let new_distance = new_distance(&pairs, examples.len(), &parts);
         Ok(Self {
             track: track.to_owned(),
             examples,
@@ -113,10 +116,10 @@ fn kernels() -> impl Iterator<Item = Kernel> {
     })
 }
 
-fn process(kernel: Kernel, inputs: &[Vec<f64>], examples: &[Example]) -> Result<Process, FrictionError> {
+fn process(kernel: Kernel, pairs: &Pairs, examples: &[Example]) -> Result<Process, FrictionError> {
     let labels: Vec<f64> = examples.iter().map(|e| e.mu).collect();
     let sigmas: Vec<f64> = examples.iter().map(|e| e.sigma.max(LEAST_SIGMA)).collect();
-    Process::new(kernel, inputs.to_vec(), &labels, &sigmas)
+    Process::new(kernel, pairs, &labels, &sigmas)
 }
 
 /// As the file has them, so that a calibration read back is the same to the bit; thinned where there are too many.
@@ -202,16 +205,16 @@ fn network_error(examples: &[Example], sources: &[Vec<usize>]) -> f64 {
 }
 
 /// How far known floors look from each other: from each part to the nearest example of another.
-fn new_distance(inputs: &[Vec<f64>], parts: &[Vec<usize>]) -> f64 {
-    let mut part_of = vec![0; inputs.len()];
+fn new_distance(pairs: &Pairs, count: usize, parts: &[Vec<usize>]) -> f64 {
+    let mut part_of = vec![0; count];
     for (k, part) in parts.iter().enumerate() {
         part.iter().for_each(|i| part_of[*i] = k);
     }
     let nearest = |i: usize| {
-        let others = (0..inputs.len()).filter(|j| part_of[*j] != part_of[i]);
-        others.map(|j| distance2(&inputs[i], &inputs[j])).fold(f64::INFINITY, f64::min).sqrt()
+        let others = (0..count).filter(|j| part_of[*j] != part_of[i]);
+        others.map(|j| pairs.distance2(i, j)).fold(f64::INFINITY, f64::min).sqrt()
     };
-    let mut distances: Vec<f64> = (0..inputs.len()).map(nearest).collect();
+    let mut distances: Vec<f64> = (0..count).map(nearest).collect();
     distances.sort_by(f64::total_cmp);
     let at = ((distances.len() as f64 * NEAR_SHARE) as usize).min(distances.len().saturating_sub(1));
     (NEAR_MARGIN * distances.get(at).copied().unwrap_or(0.0)).max(LEAST_NEW_DISTANCE)

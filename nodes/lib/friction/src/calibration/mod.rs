@@ -10,8 +10,9 @@ mod label;
 mod process;
 
 use crate::appearance::{APPEARANCE, LEAST_SCALE};
+use crate::embedding::{EMBEDDED, LEAST_EMBEDDED_SCALE};
 use crate::error::FrictionError;
-use process::{Mixture, distance2};
+use process::Mixture;
 
 pub use label::{FloorFriction, floor_friction};
 pub use process::Kernel;
@@ -27,7 +28,7 @@ const FRICTIONS: [f64; 2] = [0.03, 2.0];
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Example {
-    /// What it looks like, [`crate::appearance`].
+    /// What it looks like: [`crate::appearance`], and what the embedding says after it, where there is one.
     pub appearance: Vec<f64>,
     /// Peak friction that the car's tires reach there.
     pub mu: f64,
@@ -108,13 +109,12 @@ impl Calibration {
         &self.errors
     }
 
-    /// What it says of a picture with this [`crate::appearance`].
+    /// What it says of a picture that looks like this. Numbers beyond those that it has learned from do not count; where some are missing every floor is new.
     #[must_use]
     pub fn read(&self, appearance: &[f64]) -> Known {
         let x = scaled(appearance, &self.mean, &self.scale);
-        let (mu, variance) = self.process.read(&x);
-        let inputs = self.examples.iter().map(|e| scaled(&e.appearance, &self.mean, &self.scale));
-        let nearest = inputs.map(|i| distance2(&x, &i)).fold(f64::INFINITY, f64::min).sqrt();
+        let (mu, variance, nearest) = self.process.read(&x);
+        let nearest = if x.len() < self.mean.len() { f64::INFINITY } else { nearest };
         Known {
             mu: mu.clamp(FRICTIONS[0], FRICTIONS[1]),
             sigma: self.sigma_factor * variance.sqrt(),
@@ -127,14 +127,29 @@ fn scaled(x: &[f64], mean: &[f64], scale: &[f64]) -> Vec<f64> {
     x.iter().zip(mean).zip(scale).map(|((x, m), s)| (x - m) / s).collect()
 }
 
-/// Mean and spread of each number over the examples; what means nothing is no spread.
+/// Whether an appearance may have so many numbers: without the embedding, or with it.
+fn is_known_length(count: usize) -> bool {
+    [APPEARANCE.len(), APPEARANCE.len() + EMBEDDED].contains(&count)
+}
+
+/// Mean and spread of each number over the examples; what means nothing is no spread. What was measured and what was embedded count alike, however many
+/// numbers each of them has.
 fn scale_of(examples: &[Example]) -> (Vec<f64>, Vec<f64>) {
     let count = examples.len().max(1) as f64;
+    let numbers = examples.first().map_or(0, |e| e.appearance.len());
     let column = |k: usize| examples.iter().map(move |e| e.appearance[k]);
-    let mean: Vec<f64> = (0..APPEARANCE.len()).map(|k| column(k).sum::<f64>() / count).collect();
-    let scale = (0..APPEARANCE.len())
-        .map(|k| (column(k).map(|x| (x - mean[k]).powi(2)).sum::<f64>() / count).sqrt().max(LEAST_SCALE[k]))
-        .collect();
+    let mean: Vec<f64> = (0..numbers).map(|k| column(k).sum::<f64>() / count).collect();
+    let (measured, embedded) = (APPEARANCE.len(), numbers.saturating_sub(APPEARANCE.len()));
+    let groups = if embedded > 0 { 2.0 } else { 1.0 };
+    let scale = |k: usize| {
+        let spread = (column(k).map(|x| (x - mean[k]).powi(2)).sum::<f64>() / count).sqrt();
+        let (least, group) = match LEAST_SCALE.get(k) {
+            Some(least) => (*least, measured),
+            None => (LEAST_EMBEDDED_SCALE, embedded),
+        };
+        spread.max(least) * (groups * group as f64 / numbers as f64).sqrt()
+    };
+    let scale = (0..numbers).map(scale).collect();
     (mean, scale)
 }
 
