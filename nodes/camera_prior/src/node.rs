@@ -38,10 +38,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
     let configured = models.is_none();
     let (network, embedder) = models.map(|models| (models.network, models.embedder)).unzip();
     let mut estimator = FrictionEstimator::new(configuration.settings, configuration.basis, network);
-    // It serves what a track teaches, and costs more than the network.
-    if let Some(embedder) = embedder
-        && (configuration.learning.wanted || configuration.calibration.is_some())
-    {
+    if let Some(embedder) = embedder {
         estimator = estimator.with_embedder(embedder);
     }
     let learner = Learner::new(configuration.calibration.as_ref());

@@ -45,6 +45,8 @@ struct Sight {
     distance_m: Option<f64>,
     appearance: Vec<f64>,
     known: Option<Known>,
+    /// Probability of snow, where there is an embedding.
+    snow: f64,
 }
 
 impl std::fmt::Debug for FrictionEstimator {
@@ -215,8 +217,9 @@ impl FrictionEstimator {
         };
         if reading.refused.is_none() {
             let sight = self.sight(frame, distance_m, region)?;
+            let snow = sight.snow;
             (reading.appearance, reading.known) = (Some(sight.appearance.clone()), sight.known);
-            self.ask(&mut reading)?;
+            self.ask(&mut reading, snow)?;
         }
         Ok(reading)
     }
@@ -234,16 +237,18 @@ impl FrictionEstimator {
         let sight = match (near, &mut self.embedder, &self.seen) {
             (Some(last), Some(_), _) => last,
             (_, embedder, Some(input)) => {
-                let mut appearance = appearance(input, self.finder.scene()).to_vec();
+                let (mut appearance, mut snow) = (appearance(input, self.finder.scene()).to_vec(), 0.0);
                 if let Some(embedder) = embedder {
                     let around = decode(&frame.data, &self.settings.region.around(region))?;
                     let small = self.preprocessor.resize_to(&around, EMBEDDING_SIDE)?;
-                    appearance.extend(embedder.embed(&normalise(&small))?);
+                    let seen = embedder.embed(&normalise(&small))?;
+                    appearance.extend(seen.numbers);
+                    snow = seen.snow;
                 }
                 let known = self.calibration.as_ref().map(|c| c.read(&appearance));
-                Sight { stamp_ns, distance_m, appearance, known }
+                Sight { stamp_ns, distance_m, appearance, known, snow }
             }
-            (_, _, None) => Sight { stamp_ns, distance_m, appearance: Vec::new(), known: None },
+            (_, _, None) => Sight { stamp_ns, distance_m, appearance: Vec::new(), known: None, snow: 0.0 },
         };
         Ok(self.sight.insert(sight))
     }
@@ -263,8 +268,8 @@ impl FrictionEstimator {
         Ok((crop?, region))
     }
 
-    /// Fills in what the network says, and joins it with what the calibration does.
-    fn ask(&mut self, reading: &mut Reading) -> Result<(), FrictionError> {
+    /// Fills in what the network says, beside a probability of snow that is not its own, and joins it with what the calibration does.
+    fn ask(&mut self, reading: &mut Reading, snow: f64) -> Result<(), FrictionError> {
         let (Some(network), Some(input)) = (self.network.as_mut(), self.seen.as_ref()) else {
             reading.refused = Some(Reason::NetworkFailed);
             return Ok(());
@@ -289,6 +294,7 @@ impl FrictionEstimator {
         } else {
             None
         };
+        let p = self.snowy(p, snow);
         let network = match doubt {
             Some(_) => self.basis.uninformative,
             None => {
@@ -306,6 +312,15 @@ impl FrictionEstimator {
         reading.refused = doubt.filter(|_| weight < 0.5);
         reading.prior = reading.known.map_or(network, |known| joined(&known, weight, network));
         Ok(())
+    }
+
+    /// p, with snow as likely as the embedding holds it at least.
+    fn snowy(&self, mut p: Vec<f64>, snow: f64) -> Vec<f64> {
+        if let Some(place) = self.basis.classes.iter().position(|class| class.name == "snow") {
+            p.iter_mut().for_each(|p| *p *= 1.0 - snow);
+            p[place] += snow;
+        }
+        p
     }
 
     fn flat(&self) -> Vec<f64> {

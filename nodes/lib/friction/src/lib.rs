@@ -48,7 +48,7 @@ pub use calibration::{
     Calibration, Errors, Example, FloorFriction, Kernel, Known, NETWORK_ERROR, floor_friction,
 };
 pub use decode::decode;
-pub use embedding::{EMBEDDED, EMBEDDING_SIDE, Embedder, OnnxEmbedder};
+pub use embedding::{EMBEDDED, EMBEDDING_SIDE, Embedder, Embedding, OnnxEmbedder};
 pub use error::FrictionError;
 pub use estimate::{Estimate, Reason, Source};
 pub use estimator::{FrictionEstimator, Motion};

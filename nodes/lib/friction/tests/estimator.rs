@@ -152,7 +152,8 @@ fn a_floor_unlike_what_was_taught_is_new_and_the_network_s_again() {
     let bright: Vec<u8> = textured(3).iter().enumerate().map(|(i, v)| v / 2 + [120, 60, 0][i % 3]).collect();
     let got = at(&mut e, 0, raw(&bright), None);
     assert!(got.valid() && got.new_floor(), "{got:?}");
-    assert!((got.mu - 0.6).abs() < 0.01 && got.sigma >= 0.25, "{got:?}");
+    // It said 0.6 of a floor of 0.35: its errors here count with those elsewhere.
+    assert!((got.mu - 0.6).abs() < 0.01 && got.sigma > 1.05 * NETWORK_ERROR, "{got:?}");
 }
 
 #[test]

@@ -82,12 +82,16 @@ fn the_embedding_is_that_of_the_framework_that_it_comes_from() {
     let Some(library) = library() else { return };
     let model = gripsight_friction::find_embedding(Path::new(HERE)).unwrap();
     let small = picture(include_bytes!("golden/embedding.png"), &Region::WHOLE);
-    let got = OnnxEmbedder::load(&library, &model).unwrap().embed(&normalise(&small)).unwrap();
+    let embedding = OnnxEmbedder::load(&library, &model).unwrap().embed(&normalise(&small)).unwrap();
+    let got = &embedding.numbers;
     let golden: serde_json::Value = serde_json::from_str(include_str!("golden/embedding.json")).unwrap();
     let want = numbers(&golden["embedding"]);
     assert_eq!((got.len(), want.len()), (EMBEDDED, EMBEDDED));
     let worst = got.iter().zip(&want).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(worst < 1e-3, "off by {worst}");
+    let share = golden["snow"].as_f64().unwrap().exp();
+    let want = 8.0 * share / (1.0 + 7.0 * share);
+    assert!((embedding.snow - want).abs() < 1e-4, "{} instead of {want}", embedding.snow);
     let whole = picture(include_bytes!("golden/input.png"), &Region::WHOLE);
     let resized = Preprocessor::default().resize_to(&whole, EMBEDDING_SIDE).unwrap();
     let worst = resized.data.iter().zip(&small.data).map(|(a, b)| a.abs_diff(*b)).max().unwrap();

@@ -50,6 +50,7 @@ pub(crate) const JUMP_POSES: usize = 4;
 
 /// What an observation did to the state: what the way back needs of it.
 #[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "the large one is the usual one")]
 pub(crate) enum Update {
     /// A number was taken, by its row.
     One { h: Vector, gain: Vector, innovation: f64, variance: f64 },

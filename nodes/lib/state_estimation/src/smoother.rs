@@ -232,8 +232,6 @@ pub fn filled(sequence: &StateSequence, smoothed: &Smoothed) -> StateSequence {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
-
     use rand::SeedableRng as _;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution as _, Normal};
@@ -283,7 +281,8 @@ mod tests {
         let mut filter = Filter::new(smoothed.levels);
         begin(&mut filter, &sequence, &poses);
         let delay_s = pose_delay_s(&sequence, &poses).map_or(0.0, |d| d.0);
-        let mut forward: Vec<(f64, Matrix, [(Vector, Matrix); 2])> = Vec::new();
+        type Estimate = (Vector, Matrix);
+        let mut forward: Vec<(f64, Matrix, [Estimate; 2])> = Vec::new();
         for (time_s, observation) in events(&sequence, &poses, delay_s) {
             let transition = filter.advance(time_s);
             let predicted = (filter.s, filter.p);

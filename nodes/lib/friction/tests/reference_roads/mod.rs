@@ -4,19 +4,22 @@ use std::ops::Range;
 use std::path::Path;
 
 use gripsight_friction::{
-    Basis, Estimate, Frame, FrameData, FrictionError, FrictionEstimator, OnnxRuntime, RawPicture, Settings,
-    find_library, find_model,
+    Basis, Estimate, Frame, FrameData, FrictionError, FrictionEstimator, OnnxEmbedder, OnnxRuntime,
+    RawPicture, Settings, find_embedding, find_library, find_model,
 };
 use gripsight_reference_car::RoadCamera;
 
 /// What a camera of the reference car takes, and a larger one.
 pub(crate) const SIDES: [u32; 2] = [RoadCamera::SIDE_PX, 256];
 
-/// The released network on the fetched engine.
+/// The released networks on the fetched engine.
 pub(crate) fn estimator() -> Result<FrictionEstimator, FrictionError> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let network = OnnxRuntime::load(&find_library(None, here)?, &find_model(None, here)?)?;
-    Ok(FrictionEstimator::new(Settings::default(), Basis::builtin()?, Some(Box::new(network))))
+    let library = find_library(None, here)?;
+    let network = OnnxRuntime::load(&library, &find_model(None, here)?)?;
+    let embedder = OnnxEmbedder::load(&library, &find_embedding(here)?)?;
+    let estimator = FrictionEstimator::new(Settings::default(), Basis::builtin()?, Some(Box::new(network)));
+    Ok(estimator.with_embedder(Box::new(embedder)))
 }
 
 /// The reading of each road of friction `true_mu`, one per seed, on its own.
