@@ -90,16 +90,18 @@ impl Driver {
         let proven = PROVEN.min(step) * self.driven;
         let most = (beyond * shown).max(proven);
         let bold = (step * driven).min(most);
+        // What was planned with is no proof against a peak that was found since: a car is wide for long before it slides.
+        let proven_below = |peak: f64| self.driven.min(peak);
         let alone = match base.trust {
             Trust::Assumed => careful.max(self.driven).min(share * shown),
             Trust::Accepted => {
                 let peak = LIKELY * likely_peak.unwrap_or(shown);
-                bold.min(peak.max(self.driven)).max(share * shown)
+                bold.min(peak.max(proven_below(likely))).max(share * shown)
             }
-            Trust::AcceptedWithin => {
-                let peak = if base.peak_reached { share * likely } else { LIKELY * likely };
-                bold.min(peak.max(self.driven)).max(share * shown)
+            Trust::AcceptedWithin if base.peak_reached => {
+                bold.min((share * likely).max(proven_below(likely))).max(share * shown)
             }
+            Trust::AcceptedWithin => bold.min((LIKELY * likely).max(self.driven)).max(share * shown),
             Trust::Provisional => share * shown,
         };
         let grip = match &self.prior {

@@ -1,6 +1,6 @@
 //! A road whose friction changes while the car is watched.
 
-use gripsight_identification::{Config, Monitor, PerAxle, ResidualKind, identify};
+use gripsight_identification::{Config, Monitor, PerAxle, ResidualKind, Status, identify};
 use gripsight_reference_car::Friction;
 
 use crate::support::{drive, scenario, with_background};
@@ -15,6 +15,14 @@ fn after_a_change_of_grip_the_new_road_is_identified_and_accepted_though_its_pea
     let outcome = identify(&sequence, &vehicle, None, None, &config, &mut |_| {}).unwrap();
     let set = outcome.accepted_set().unwrap_or_else(|| panic!("{:?}", outcome.reasons));
     assert!(outcome.grip.is_none());
+    // A peak measured anew stands in place of a higher one of before; what was only shown does not shrink in a slower lap.
+    assert_eq!(outcome.status, Status::Accepted, "{:?}", outcome.reasons);
+    let mut luckier = set.clone();
+    (luckier.promised.front.d, luckier.promised.rear.d) =
+        (1.05 * set.promised.front.d, 1.05 * set.promised.rear.d);
+    assert!(outcome.replaces(Some(&luckier)));
+    luckier.status = Status::AcceptedWithin;
+    assert!(!outcome.replaces(Some(&luckier)));
 
     let (_, changing, _) = on(Friction::Changing { mu: 0.7, mu_after: 0.9, at_s: 14.0, over_s: 0.1 }, 43);
     let next = identify(&changing, &vehicle, None, Some(&set), &config, &mut |_| {}).unwrap();
