@@ -2,9 +2,13 @@
 
 #![allow(clippy::unwrap_used)]
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use gripsight_friction::{
-    Answer, Basis, Calibration, Estimate, Example, Frame, FrameData, FrictionError, FrictionEstimator,
-    Motion, NETWORK_ERROR, Network, RawPicture, Reason, Settings, Source,
+    APPEARANCE, Answer, Basis, Calibration, EMBEDDED, EMBEDDING_SIDE, Embedder, Embedding, Estimate, Example,
+    Frame, FrameData, FrictionError, FrictionEstimator, Motion, NETWORK_ERROR, Network, RawPicture, Reason,
+    Settings, Source,
 };
 
 /// Answers with fixed logits and a fixed distance.
@@ -13,6 +17,17 @@ struct Says(Vec<f32>, Option<f32>);
 impl Network for Says {
     fn read(&mut self, _: &[f32]) -> Result<Answer, FrictionError> {
         Ok(Answer { logits: self.0.clone(), unfamiliarity: self.1 })
+    }
+}
+
+/// Sees so much snow, and counts how often it looks.
+struct Sees(f64, Arc<AtomicU32>);
+
+impl Embedder for Sees {
+    fn embed(&mut self, tensor: &[f32]) -> Result<Embedding, FrictionError> {
+        assert_eq!(tensor.len(), 3 * (EMBEDDING_SIDE * EMBEDDING_SIDE) as usize);
+        self.1.fetch_add(1, Ordering::Relaxed);
+        Ok(Embedding { numbers: vec![f64::from(tensor[0]); EMBEDDED], snow: self.0 })
     }
 }
 
@@ -116,6 +131,37 @@ fn a_picture_unlike_the_training_pictures_is_not_believed_however_sure_the_netwo
         let got = says(usual);
         assert!(got.valid() && got.unfamiliarity == usual.map(f64::from), "{got:?}");
     }
+}
+
+#[test]
+fn snow_that_the_embedding_sees_counts_whatever_the_network_says() {
+    let reading = |snow| {
+        let mut e = estimator(&WET).with_embedder(Box::new(Sees(snow, Arc::default())));
+        at(&mut e, 0, raw(&textured(1)), None)
+    };
+    assert!((reading(0.0).mu - 0.6).abs() < 0.01);
+    let (half, all) = (reading(0.5), reading(1.0));
+    assert!((half.mu - 0.425).abs() < 0.01, "{half:?}");
+    assert!((all.mu - 0.25).abs() < 0.01 && all.probability[3] > 0.99, "{all:?}");
+}
+
+#[test]
+fn an_embedding_stands_for_a_metre_and_a_tenth_of_a_second() {
+    let looks = Arc::new(AtomicU32::new(0));
+    let mut e = estimator(&WET).with_embedder(Box::new(Sees(0.1, looks.clone())));
+    // Thirty pictures a second at 1 m/s, then at 30 m/s, then without odometry.
+    let mut expect = |from_ms: i64, metres_a_picture: Option<f64>, looked: u32| {
+        let before = looks.load(Ordering::Relaxed);
+        for k in 0..30u32 {
+            let distance_m = metres_a_picture.map(|m| from_ms as f64 + m * f64::from(k));
+            let got = at(&mut e, from_ms + i64::from(k) * 33, raw(&textured(k)), distance_m);
+            assert_eq!(got.appearance.map(|a| a.len()), Some(APPEARANCE.len() + EMBEDDED));
+        }
+        assert_eq!(looks.load(Ordering::Relaxed) - before, looked);
+    };
+    expect(0, Some(1.0 / 30.0), 1);
+    expect(2_000, Some(1.0), 8);
+    expect(4_000, None, 3);
 }
 
 /// A track whose only floor looks like `textured` and has a friction of 0.35.
