@@ -154,7 +154,7 @@ fn an_embedding_stands_for_a_metre_and_a_tenth_of_a_second() {
         let before = looks.load(Ordering::Relaxed);
         for k in 0..30u32 {
             let distance_m = metres_a_picture.map(|m| from_ms as f64 + m * f64::from(k));
-            let got = at(&mut e, from_ms + i64::from(k) * 33, raw(&textured(k)), distance_m);
+            let got = at(&mut e, from_ms + i64::from(k) * 33, raw(&textured(1000 * k + 1)), distance_m);
             assert_eq!(got.appearance.map(|a| a.len()), Some(APPEARANCE.len() + EMBEDDED));
         }
         assert_eq!(looks.load(Ordering::Relaxed) - before, looked);
