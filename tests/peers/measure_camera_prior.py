@@ -2,7 +2,7 @@
 
     measure_camera_prior.py BINARY PICTURE (raw|jpeg) [--frames 300] [--rate 30]
 
-PICTURE is a usable road picture of 1280x720, a binary PPM (P6) for raw, else a JPEG. Every frame
+PICTURE is a usable road picture, a binary PPM (P6) for raw, else a JPEG. Every frame
 differs in one byte (raw) or in bytes behind the end marker (JPEG), as a live camera's frames do. CPU: user and system time of
 the node's process between the first and the last frame, from /proc, over the frames sent; it includes receiving them. A
 prior carries its picture's stamp, so frames that yield no prior are counted as lost or dropped; the node's diagnostics say
@@ -24,23 +24,23 @@ from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
-WIDTH, HEIGHT = 1280, 720
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 def pixels(path):
-    """The pixels of a P6 file without comments."""
-    magic, width, height, levels, data = path.read_bytes().split(maxsplit=4)
-    assert (magic, int(width), int(height), levels) == (b"P6", WIDTH, HEIGHT, b"255"), path
-    return data
+    """Width, height and pixels of a P6 file without comments."""
+    magic, width, height, rest = path.read_bytes().split(maxsplit=3)
+    levels, data = rest[:3], rest[4:]
+    assert (magic, levels, len(data)) == (b"P6", b"255", 3 * int(width) * int(height)), path
+    return int(width), int(height), data
 
 
 def message(form, path):
     """A kind of message, its topic and its serialised form; the stamp is at byte 4."""
     header = {"frame_id": "camera"}
     if form == "raw":
-        kind, data = struct("sensor_msgs", "Image"), pixels(path)
-        sample = {"header": header, "height": HEIGHT, "width": WIDTH, "encoding": "rgb8", "step": 3 * WIDTH}
+        kind, (width, height, data) = struct("sensor_msgs", "Image"), pixels(path)
+        sample = {"header": header, "height": height, "width": width, "encoding": "rgb8", "step": 3 * width}
         topic = "rt/image"
     else:
         kind, data = struct("sensor_msgs", "CompressedImage"), path.read_bytes() + bytes(4)

@@ -25,6 +25,8 @@ struct Earlier {
     valid_within: ValidWithin,
     signals: SignalCorrections,
     nuisance: Nuisance,
+    /// Not in files of before.
+    fitted: Option<PacejkaParameters>,
     peak_friction: PerAxle<Peak>,
     rmse: Errors,
     key: RunKey,
@@ -62,6 +64,10 @@ pub(crate) fn read(path: &Path) -> anyhow::Result<AcceptedSet> {
     }
     let earlier: Earlier = serde_json::from_str(&text).with_context(not_one)?;
     let tires = |set| checked_tires(set).with_context(|| format!("cannot use {}", path.display()));
+    let (fitted, nuisance) = match earlier.fitted {
+        Some(fitted) => (fitted, earlier.nuisance),
+        None => (earlier.found, Nuisance { combined_slip: 0.0, ..earlier.nuisance }),
+    };
     Ok(AcceptedSet {
         vehicle_hash: earlier.key.vehicle_hash,
         sequence_id: earlier.key.sequence_id,
@@ -70,7 +76,8 @@ pub(crate) fn read(path: &Path) -> anyhow::Result<AcceptedSet> {
         status: earlier.status,
         valid_within: earlier.valid_within,
         corrections: earlier.signals,
-        nuisance: Nuisance { combined_slip: 0.0, ..earlier.nuisance },
+        fitted: tires(fitted)?,
+        nuisance,
         rollout_rmse: [earlier.rmse.rollout.v_y_mps.after, earlier.rmse.rollout.yaw_rate_radps.after],
         peak_reached: earlier.peak_friction.map(|p| p.reached),
     })

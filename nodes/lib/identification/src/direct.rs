@@ -61,6 +61,8 @@ pub(crate) struct Direct {
     pub(crate) fit: Fit,
     /// Covariance of its parameters; `None` where nothing is known.
     covariance: Option<DMatrix<f64>>,
+    /// The tires of the fit itself, beside all that it allowed for.
+    pub(crate) fitted: PacejkaParameters,
     /// What the fit allowed for beside the tires.
     pub(crate) allowed: Nuisance,
     /// The same as rollouts with [`Self::tires`] need it: what combined slip takes is in the tires already.
@@ -168,6 +170,7 @@ pub(crate) fn direct(
         },
         corrections: corrections_of(&found.parameters),
         nuisance: Nuisance { combined_slip: 0.0, ..allowed },
+        fitted,
         allowed,
         shift,
         signal_errors: std::array::from_fn(|j| match standard_error(covariance.as_ref(), SIGNALS + j) {

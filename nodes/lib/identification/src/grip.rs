@@ -200,6 +200,7 @@ mod tests {
             status: Status::Accepted,
             valid_within: ValidWithin { slip_rad: both(slip_rad), force_n: both(10.0) },
             corrections: SignalCorrections::NONE,
+            fitted: tires,
             nuisance: Nuisance { relaxation_m: 0.0, combined_slip: 0.0, load_transfer: 0.0 },
             rollout_rmse: [0.01; 2],
             peak_reached: both(true),

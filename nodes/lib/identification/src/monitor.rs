@@ -50,7 +50,7 @@ impl Reading {
     /// The change in words, if there was one, against the set that was watched.
     #[must_use]
     pub fn notice(&self, set: &AcceptedSet) -> Option<String> {
-        let (now, then) = (&self.peak_factor, &set.phi_p);
+        let (now, then) = (&self.peak_factor, &set.fitted);
         self.changed.then(|| {
             format!(
                 "the grip has changed: D {:.2} -> {:.2} front, {:.2} -> {:.2} rear",
@@ -149,7 +149,8 @@ impl Monitor {
         };
         let late = |w: &Window| begin_s(w) >= from_s;
         let all: Vec<Window> = data.windows.iter().map(|(w, _)| *w).collect();
-        let p = vector_of(&self.set.phi_p, &self.set.corrections, &self.set.nuisance);
+        // With what braking and driving take: a few corners may be braked into harder than all of those before.
+        let p = vector_of(&self.set.fitted, &self.set.corrections, &self.set.nuisance);
         let mut windows: Vec<Window> = all.iter().copied().filter(late).collect();
         let within: Vec<Window> = windows.iter().copied().filter(|w| self.speaks_of(&model, &p, w)).collect();
         let silent = within.len() < WINDOWS;
@@ -205,9 +206,9 @@ impl Monitor {
                 && (force(&after) - force(&then)).abs() > NOTICEABLE * force(&then)
                 && (reached || force(&after) < force(&promised))
         };
-        let AcceptedSet { phi_p, promised, peak_reached, .. } = &self.set;
-        let changed = differs(0, phi_p.front, promised.front, peak_reached.front)
-            || differs(1, phi_p.rear, promised.rear, peak_reached.rear);
+        let AcceptedSet { fitted, promised, peak_reached, .. } = &self.set;
+        let changed = differs(0, fitted.front, promised.front, peak_reached.front)
+            || differs(1, fitted.rear, promised.rear, peak_reached.rear);
         let stamp_ns = |time_s: f64| sequence.start_stamp_ns + (time_s * gripsight_signals::NS_PER_S) as i64;
         Ok(Reading {
             stamp_ns: stamp_ns(sequence.duration_s()),

@@ -283,6 +283,8 @@ pub struct Outcome {
     pub weak_signals: Vec<WeakSignal>,
     /// What the direct fit allowed for beside the tires.
     pub nuisance: Nuisance,
+    /// The tires of that fit, which go with all that it allowed for: above `found` by what longitudinal forces took from these.
+    pub fitted: PacejkaParameters,
     /// Errors on held-out data.
     pub rmse: RmseReport,
     /// Rollout error over its horizon.
@@ -356,7 +358,8 @@ impl Outcome {
             status: self.status,
             valid_within: self.valid_within,
             corrections: self.signals,
-            nuisance: Nuisance { combined_slip: 0.0, ..self.nuisance },
+            fitted: self.fitted,
+            nuisance: self.nuisance,
             rollout_rmse: [self.rmse.rollout.v_y_mps.after, self.rmse.rollout.yaw_rate_radps.after],
             peak_reached: self.peak_friction.map(|p| p.reached),
         })
