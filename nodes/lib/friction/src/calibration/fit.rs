@@ -19,7 +19,7 @@ const ELSEWHERE: f64 = 3.0;
 const NEAR_SHARE: f64 = 0.9;
 const NEAR_MARGIN: f64 = 1.3;
 /// Pictures of one place differ by this much, in scales.
-const LEAST_NEW_DISTANCE: f64 = 0.5;
+const LEAST_NEW_DISTANCE: f64 = 0.6;
 
 /// How much the shapes' shares, which come from these very parts, flatter sigma, over the root of the number of parts.
 const CHOSEN: f64 = 0.9;
