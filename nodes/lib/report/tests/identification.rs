@@ -89,6 +89,7 @@ fn outcome() -> Outcome {
         },
         weak_signals: vec![WeakSignal { name: "yaw_rate_bias_radps", data_share: 0.04, prior_sigma: 0.01 }],
         nuisance: Nuisance { relaxation_m: 0.05, combined_slip: 0.3, load_transfer: 0.8 },
+        fitted: config.initial,
         rmse: RmseReport { one_step: rmse(1.1), rollout: rmse(2.3), horizon_s: 1.0, noise: [0.01, 0.02] },
         rollout_error: (1..=20)
             .map(|k| f64::from(k) * 0.1)
