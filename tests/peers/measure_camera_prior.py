@@ -117,7 +117,7 @@ def main():
     answered = [(heard[stamp][0] - now, heard[stamp][1]) for stamp, now in sent.items() if stamp in heard]
     reasons = sorted({got.reason for _, got in answered if not got.valid})
     latency_ms = [1e3 * seconds for seconds, _ in answered]
-    print(f"{args.form} {WIDTH}x{HEIGHT}, {len(frame)} bytes a message, {len(sent)} frames in {busy:.2f} s")
+    print(f"{args.form} {args.picture.name}, {len(frame)} bytes a message, {len(sent)} frames in {busy:.2f} s")
     print(f"priors {len(answered)}, of them valid {sum(got.valid for _, got in answered)} {reasons}, without a prior {len(sent) - len(answered)}")
     print(f"CPU of the node: {1e3 * cpu / len(sent):.2f} ms a frame sent; without pictures {1e3 * idle:.1f} ms a second")
     if latency_ms:
