@@ -244,9 +244,10 @@ fn usual_folder() -> Option<PathBuf> {
 
 fn models(library: Option<&Path>, model: Option<&Path>, beside: &Path) -> Result<Models, FrictionError> {
     let library = find_library(library, beside)?;
+    let model = find_model(model, beside)?;
     Ok(Models {
-        network: Box::new(OnnxRuntime::load(&library, &find_model(model, beside)?)?),
-        embedder: Box::new(OnnxEmbedder::load(&library, &find_embedding(beside)?)?),
+        network: Box::new(OnnxRuntime::load(&library, &model)?),
+        embedder: Box::new(OnnxEmbedder::load(&library, &find_embedding(&model, beside)?)?),
     })
 }
 

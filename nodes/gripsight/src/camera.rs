@@ -57,7 +57,7 @@ impl CameraArgs {
         let model = find_model(self.model.as_deref(), folder)?;
         let network = OnnxRuntime::load(&library, &model)?;
         let settings = Settings { region: self.region, ..Settings::default() };
-        let embedder = OnnxEmbedder::load(&library, &find_embedding(folder)?)?;
+        let embedder = OnnxEmbedder::load(&library, &find_embedding(&model, folder)?)?;
         let mut estimator = FrictionEstimator::new(settings, basis, Some(Box::new(network)))
             .with_embedder(Box::new(embedder));
         estimator.calibrate(calibration);

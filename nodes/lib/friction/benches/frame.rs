@@ -26,8 +26,9 @@ fn road() -> Result<RgbImage, Box<dyn Error>> {
 fn estimator() -> Result<FrictionEstimator, Box<dyn Error>> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let library = find_library(None, here)?;
-    let network = OnnxRuntime::load(&library, &find_model(None, here)?)?;
-    let embedder = OnnxEmbedder::load(&library, &find_embedding(here)?)?;
+    let model = find_model(None, here)?;
+    let network = OnnxRuntime::load(&library, &model)?;
+    let embedder = OnnxEmbedder::load(&library, &find_embedding(&model, here)?)?;
     let estimator = FrictionEstimator::new(Settings::default(), Basis::builtin()?, Some(Box::new(network)));
     Ok(estimator.with_embedder(Box::new(embedder)))
 }

@@ -35,8 +35,8 @@ pub trait Embedder: Send {
 }
 
 /// What the odds of ImageNet's six classes that live in snow (alp, ski, snowmobile, snowplow, dog sled, bobsled) are multiplied by: they are six of a thousand
-/// there, and a road in snow is often taken for a car. Chosen on the development pictures of `tests/results/camera_prior/real_roads.csv`; 4 and 16 are as
-/// good within 0.01 of the error.
+/// there, and a road in snow is often taken for a car. Chosen on the development pictures of `tests/results/camera_prior/real_roads.csv` by
+/// `snow_odds.py` there.
 const SNOW_ODDS: f64 = 8.0;
 
 /// The embedding model on ONNX Runtime.
@@ -72,10 +72,10 @@ impl Embedder for OnnxEmbedder {
             );
             return Err(FrictionError::Inference { message });
         }
-        let odds = SNOW_ODDS * f64::from(snow[0]).exp();
+        let share = f64::from(snow[0]).exp().min(1.0);
         Ok(Embedding {
             numbers: numbers.iter().map(|x| f64::from(*x)).collect(),
-            snow: odds / (odds + 1.0 - odds / SNOW_ODDS),
+            snow: SNOW_ODDS * share / (SNOW_ODDS * share + 1.0 - share),
         })
     }
 }

@@ -103,7 +103,7 @@ pub struct Estimate {
     pub sigma: f64,
     /// p, averaged over the distance travelled; uniform where not usable or configured.
     pub probability: Vec<f64>,
-    /// Entropy of the newest picture's own p over that of a uniform p, 0 to 1.
+    /// Entropy of the network's own p of the newest picture over that of a uniform p, 0 to 1.
     pub entropy: f64,
     /// Energy of the newest picture's logits, -ln sum exp z; zero where the network was not asked.
     pub energy: f64,

@@ -32,12 +32,13 @@ pub fn find_model(explicit: Option<&Path>, program_folder: &Path) -> Result<Path
     find("model", explicit, places_of(MODEL, program_folder))
 }
 
-/// The embedding, in the same places.
+/// The embedding: beside the model in use, else where a model is looked for.
 ///
 /// # Errors
 /// [`FrictionError::NotFound`] with the places looked at.
-pub fn find_embedding(program_folder: &Path) -> Result<PathBuf, FrictionError> {
-    find("embedding model", None, places_of(EMBEDDING, program_folder))
+pub fn find_embedding(model: &Path, program_folder: &Path) -> Result<PathBuf, FrictionError> {
+    let beside = [model.with_file_name(EMBEDDING)];
+    find("embedding model", None, beside.into_iter().chain(places_of(EMBEDDING, program_folder)))
 }
 
 fn places_of<'a>(file: &'a str, program_folder: &'a Path) -> impl Iterator<Item = PathBuf> + 'a {

@@ -80,7 +80,7 @@ fn onnx_runtime_gives_the_training_frameworks_answer() {
 #[test]
 fn the_embedding_is_that_of_the_framework_that_it_comes_from() {
     let Some(library) = library() else { return };
-    let model = gripsight_friction::find_embedding(Path::new(HERE)).unwrap();
+    let model = gripsight_friction::find_embedding(&self::model(), Path::new(HERE)).unwrap();
     let small = picture(include_bytes!("golden/embedding.png"), &Region::WHOLE);
     let embedding = OnnxEmbedder::load(&library, &model).unwrap().embed(&normalise(&small)).unwrap();
     let got = &embedding.numbers;

@@ -218,9 +218,9 @@ pub struct AcceptedSet {
     pub valid_within: ValidWithin,
     /// The signals' corrections that go with the tires found.
     pub corrections: SignalCorrections,
-    /// The tires of the fit itself, and what it allowed for beside them.
+    /// The tires of the fit itself, which a [`Monitor`](crate::Monitor) watches.
     pub fitted: PacejkaParameters,
-    /// See there.
+    /// What the fit allowed for beside these.
     pub nuisance: Nuisance,
     /// Root mean square error of held-out rollouts: v_y in m/s, yaw rate in rad/s.
     pub rollout_rmse: [f64; 2],

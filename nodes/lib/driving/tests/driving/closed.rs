@@ -291,6 +291,11 @@ fn sets_are_taken_for_what_they_are_good_for() {
     known.take(set(0.8, Trust::Accepted)).unwrap();
     approx::assert_relative_eq!(known.grip(), settings.share * 0.8, max_relative = 1e-2);
 
+    // A peak that is found lower later holds against a plan that was driven without a slide.
+    drive(&mut known, |_| 0.8, 0.0, 60.0);
+    known.take(TireSet { likely_peaks: Some([0.7; 2]), ..set(0.7, Trust::Accepted) }).unwrap();
+    assert!(known.grip() <= 0.7 * 1.001, "{}", known.grip());
+
     // It is not: a step beyond what was driven, but not beyond what is likely.
     let mut within = driver(TireSet::start());
     drive(&mut within, |_| 0.8, 0.0, 60.0);

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::appearance::APPEARANCE;
+use crate::embedding::EMBEDDED;
 use crate::error::FrictionError;
 
 use super::process::{Kernel, Mixture, Pairs, Process};
@@ -47,14 +49,13 @@ impl Calibration {
         }
         let numbers = examples[0].appearance.len();
         for e in &examples {
-            let fine = is_known_length(numbers)
-                && e.appearance.len() == numbers
-                && e.appearance.iter().all(|x| x.is_finite());
+            let fine = is_known_length(numbers) && e.appearance.iter().all(|x| x.is_finite());
             if !fine || !(0.01..=3.0).contains(&e.mu) || !(0.0..=1.0).contains(&e.sigma) {
                 return Err(bad(format!(
-                    "a picture of {}: expected {} finite numbers, a friction of 0.01 to 3 and a sigma of 0 to 1, got {} numbers, {} and {}",
+                    "a picture of {}: expected {} finite numbers, or {} with the embedding, a friction of 0.01 to 3 and a sigma of 0 to 1, got {} numbers, {} and {}",
                     e.source,
-                    numbers,
+                    APPEARANCE.len(),
+                    APPEARANCE.len() + EMBEDDED,
                     e.appearance.len(),
                     e.mu,
                     e.sigma
@@ -122,17 +123,19 @@ fn process(kernel: Kernel, pairs: &Pairs, examples: &[Example]) -> Result<Proces
     Process::new(kernel, pairs, &labels, &sigmas)
 }
 
-/// As the file has them, so that a calibration read back is the same to the bit; thinned where there are too many.
+/// As the file has them, so that a calibration read back is the same to the bit; thinned where there are too many, and of the numbers that all of them have:
+/// a track taught before there was an embedding goes on without it until those pictures are gone.
 fn kept(examples: &[Example]) -> Vec<Example> {
     let rounded = |x: f64| (x * 1e4).round() / 1e4;
     let stride = examples.len().div_ceil(MOST_EXAMPLES).max(1);
+    let common = examples.iter().map(|e| e.appearance.len()).min().unwrap_or(0);
     let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
     let mut kept = vec![];
     for e in examples {
         let count = seen.entry(&e.source).or_default();
         if count.is_multiple_of(stride) {
             kept.push(Example {
-                appearance: e.appearance.iter().copied().map(rounded).collect(),
+                appearance: e.appearance.iter().take(common).copied().map(rounded).collect(),
                 mu: rounded(e.mu),
                 sigma: rounded(e.sigma),
                 network_mu: e.network_mu.map(rounded),
@@ -277,6 +280,21 @@ mod tests {
         let mut wrong = floor("carpet", 0.9, 0.0, 5, 1);
         wrong[3].mu = 9.0;
         assert!(Calibration::learn("lab", &wrong).is_err());
+    }
+
+    #[test]
+    fn a_track_taught_before_there_was_an_embedding_is_taught_on() {
+        let before = [floor("carpet", 0.9, 0.0, 10, 1), floor("tiles", 0.4, 4.0, 10, 2)].concat();
+        let mut more = floor("more tiles", 0.4, 4.0, 4, 5);
+        more.iter_mut().for_each(|e| e.appearance.extend([1.0; EMBEDDED]));
+        let taught = Calibration::learn("lab", &[before, more.clone()].concat()).unwrap();
+        let got = taught.read(&more[0].appearance);
+        assert!((got.mu - 0.4).abs() < 0.1 && got.weight() > 0.9, "{got:?}");
+        // Whoever learned with the embedding cannot tell without.
+        let with = Calibration::learn("lab", &more).unwrap();
+        assert!(with.read(&more[0].appearance[..16]).weight() < 1e-12);
+        let read_back = Calibration::from_json(&with.to_json().unwrap()).unwrap();
+        assert_eq!(read_back.read(&more[1].appearance), with.read(&more[1].appearance));
     }
 
     #[test]

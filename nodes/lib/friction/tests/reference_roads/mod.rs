@@ -16,8 +16,9 @@ pub(crate) const SIDES: [u32; 2] = [RoadCamera::SIDE_PX, 256];
 pub(crate) fn estimator() -> Result<FrictionEstimator, FrictionError> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let library = find_library(None, here)?;
-    let network = OnnxRuntime::load(&library, &find_model(None, here)?)?;
-    let embedder = OnnxEmbedder::load(&library, &find_embedding(here)?)?;
+    let model = find_model(None, here)?;
+    let network = OnnxRuntime::load(&library, &model)?;
+    let embedder = OnnxEmbedder::load(&library, &find_embedding(&model, here)?)?;
     let estimator = FrictionEstimator::new(Settings::default(), Basis::builtin()?, Some(Box::new(network)));
     Ok(estimator.with_embedder(Box::new(embedder)))
 }
