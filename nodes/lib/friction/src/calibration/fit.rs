@@ -287,7 +287,7 @@ mod tests {
         let before = [floor("carpet", 0.9, 0.0, 10, 1), floor("tiles", 0.4, 4.0, 10, 2)].concat();
         let mut more = floor("more tiles", 0.4, 4.0, 4, 5);
         more.iter_mut().for_each(|e| e.appearance.extend([1.0; EMBEDDED]));
-        let taught = Calibration::learn("lab", &[before, more.clone()].concat()).unwrap();
+        let taught = Calibration::learn("lab", &[more.clone(), before].concat()).unwrap();
         let got = taught.read(&more[0].appearance);
         assert!((got.mu - 0.4).abs() < 0.1 && got.weight() > 0.9, "{got:?}");
         // Whoever learned with the embedding cannot tell without.
