@@ -24,7 +24,7 @@ pub struct Linearization {
     pub window_costs: Vec<f64>,
     /// Residuals that count.
     pub residuals: usize,
-    pub(super) eliminations: Vec<Elimination>,
+    eliminations: Vec<Elimination>,
 }
 
 impl Linearization {
@@ -33,13 +33,23 @@ impl Linearization {
     pub fn evaluation(&self) -> Evaluation {
         Evaluation { cost: self.cost, window_costs: self.window_costs.clone(), residuals: self.residuals }
     }
+
+    /// The best start states after a step of the free parameters.
+    #[must_use]
+    pub fn starts_after(&self, step: &DVector<f64>, starts: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        let moved = |(x, e): (&[f64; 2], &Elimination)| {
+            let dx = e.offset + &e.slope * step;
+            [x[0] - dx[0], x[1] - dx[1]]
+        };
+        starts.iter().zip(&self.eliminations).map(moved).collect()
+    }
 }
 
 /// How the start of a window follows a step of the parameters: dx = -(offset + slope dtheta).
 #[derive(Debug, Clone)]
-pub(super) struct Elimination {
-    pub(super) offset: Vector2<f64>,
-    pub(super) slope: Matrix2xX<f64>,
+struct Elimination {
+    offset: Vector2<f64>,
+    slope: Matrix2xX<f64>,
 }
 
 struct WindowPart {

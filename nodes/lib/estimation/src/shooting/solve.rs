@@ -3,7 +3,7 @@
 use gripsight_model::Rollout;
 use nalgebra::{DMatrix, DVector};
 
-use super::{Evaluation, Linearization, Problem, evaluate, linearize};
+use super::{Evaluation, Linearization, Parameter, Problem, evaluate, linearize};
 
 /// Why a fit ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -186,38 +186,26 @@ fn step<M: Rollout>(
     here: &Linearization,
     damping: &mut f64,
 ) -> Option<(Vec<f64>, Vec<[f64; 2]>, Evaluation)> {
-    // A parameter on its bound that would go further out does not take part.
-    let pinned: Vec<bool> = free
-        .iter()
-        .enumerate()
-        .map(|(row, &j)| {
-            let (p, v, g) = (&problem.parameters[j], parameters[j], here.gradient[row]);
-            (v <= p.low && g > 0.0) || (v >= p.high && g < 0.0)
-        })
-        .collect();
+    let room = |bound: fn(&Parameter) -> f64| {
+        DVector::from_iterator(
+            free.len(),
+            free.iter().map(|&j| bound(&problem.parameters[j]) - parameters[j]),
+        )
+    };
+    let (low, high) = (room(|p| p.low), room(|p| p.high));
     for _ in 0..12 {
         let mut information = here.information.clone();
-        let mut gradient = here.gradient.clone();
         for a in 0..free.len() {
             information[(a, a)] += *damping * information[(a, a)].max(1e-12);
         }
-        pin(&mut information, Some(&mut gradient), &pinned);
-        if let Some(cholesky) = information.cholesky() {
-            let step = -cholesky.solve(&gradient);
+        if let Some(step) = within(&information, &here.gradient, &low, &high) {
             let mut trial = parameters.to_vec();
             for (row, &j) in free.iter().enumerate() {
                 let p = &problem.parameters[j];
                 trial[j] = (trial[j] + step[row]).clamp(p.low, p.high);
             }
             let taken = DVector::from_iterator(free.len(), free.iter().map(|&j| trial[j] - parameters[j]));
-            let trial_starts: Vec<[f64; 2]> = starts
-                .iter()
-                .zip(&here.eliminations)
-                .map(|(x, e)| {
-                    let dx = e.offset + &e.slope * &taken;
-                    [x[0] - dx[0], x[1] - dx[1]]
-                })
-                .collect();
+            let trial_starts = here.starts_after(&taken, starts);
             let at = evaluate(problem, &trial, &trial_starts);
             if at.cost < here.cost {
                 *damping = (*damping * 0.2).max(1e-9);
@@ -227,6 +215,47 @@ fn step<M: Rollout>(
         *damping = (*damping * 5.0).max(1e-6);
     }
     None
+}
+
+/// The step within bounds that lowers s^T H s/2 + g^T s most: what would leave is held at its bound, and the others go where that leaves them (an active
+/// set: Nocedal and Wright, Numerical Optimization, 16.5). Cut off there instead, they go on as if it had moved. `None` where H is not positive definite.
+fn within(
+    information: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    low: &DVector<f64>,
+    high: &DVector<f64>,
+) -> Option<DVector<f64>> {
+    let n = gradient.len();
+    let mut held = vec![None; n];
+    let mut step = DVector::zeros(n);
+    for _ in 0..2 * n + 2 {
+        let pinned: Vec<bool> = held.iter().map(Option::is_some).collect();
+        let at: DVector<f64> = DVector::from_iterator(n, held.iter().map(|h| h.unwrap_or(0.0)));
+        let mut matrix = information.clone();
+        let mut side = -gradient - information * &at;
+        pin(&mut matrix, Some(&mut side), &pinned);
+        step = at + matrix.cholesky()?.solve(&side);
+        let outside = |a: usize| match step[a] {
+            s if s < low[a] => Some(low[a]),
+            s if s > high[a] => Some(high[a]),
+            _ => None,
+        };
+        let leaving: Vec<usize> = (0..n).filter(|&a| held[a].is_none() && outside(a).is_some()).collect();
+        if !leaving.is_empty() {
+            leaving.into_iter().for_each(|a| held[a] = outside(a));
+            continue;
+        }
+        let slope = information * &step + gradient;
+        let inwards =
+            |a: usize| held[a].is_some_and(|at| if at <= low[a] { slope[a] < 0.0 } else { slope[a] > 0.0 });
+        let Some(back) =
+            (0..n).filter(|&a| inwards(a)).max_by(|&a, &b| slope[a].abs().total_cmp(&slope[b].abs()))
+        else {
+            break;
+        };
+        held[back] = None;
+    }
+    Some(step)
 }
 
 /// Takes rows and columns out of a system without changing its size.
@@ -239,6 +268,38 @@ fn pin(information: &mut DMatrix<f64>, gradient: Option<&mut DVector<f64>>, pinn
     if let Some(gradient) = gradient {
         for a in (0..pinned.len()).filter(|&a| pinned[a]) {
             gradient[a] = 0.0;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn no_step_within_the_bounds_leads_lower(
+            root in proptest::collection::vec(-1.0..1.0, 16),
+            gradient in proptest::collection::vec(-3.0..3.0, 4),
+            low in proptest::collection::vec(-1.0..0.0, 4),
+            high in proptest::collection::vec(0.0..1.0, 4),
+            other in proptest::collection::vec(0.0..1.0, 4),
+        ) {
+            let root = DMatrix::from_vec(4, 4, root);
+            let information = &root * root.transpose() + DMatrix::identity(4, 4) * 0.01;
+            let [gradient, low, high] = [gradient, low, high].map(DVector::from_vec);
+            let cost = |s: &DVector<f64>| 0.5 * s.dot(&(&information * s)) + s.dot(&gradient);
+            let best = within(&information, &gradient, &low, &high).unwrap();
+            for a in 0..4 {
+                prop_assert!(low[a] - 1e-9 <= best[a] && best[a] <= high[a] + 1e-9, "{best} leaves the bounds");
+            }
+            let there = DVector::from_fn(4, |a, _| low[a] + other[a] * (high[a] - low[a]));
+            for share in [1.0, 0.1, 0.01] {
+                let step = &best + (&there - &best) * share;
+                prop_assert!(cost(&step) >= cost(&best) - 1e-9, "{step} is lower than {best}");
+            }
         }
     }
 }
