@@ -2,7 +2,7 @@
 
 use gripsight_estimation::Windows;
 use gripsight_estimation::selection::{Configuration, Quadratic, Selection, Term, configuration};
-use gripsight_estimation::shooting::{self, Parameter, Prior};
+use gripsight_estimation::shooting::{self, Parameter, Prior, Problem};
 use gripsight_model::{BASE, EffectId, ExtendedModel, Site};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -18,8 +18,9 @@ const ITERATIONS: usize = 4;
 const ITERATIONS_TO_THE_END: usize = 20;
 /// Parameters that a fit can move; what is beyond stays at the linear answer.
 const MOST_FREE: usize = 78;
-/// Chord steps at most, and the gain in twice the log evidence below which no more are made.
+/// Chord steps at most.
 const STEPS: usize = 4;
+/// Gain in twice the log evidence below which no more steps are made.
 const SETTLED: f64 = 0.2;
 /// Loss of the linear evidence up to which rollouts are asked whether an effect is needed.
 const CLEAR: f64 = 40.0;
@@ -95,35 +96,43 @@ impl Around<'_, '_> {
         self.columns.model(engine, values, has, &sites)
     }
 
-    /// Logarithm of a configuration's evidence by rollouts instead of the linearisation; its prior weight counted.
-    pub(crate) fn by_rollouts(&self, problem: &Quadratic, chosen: &[usize]) -> Option<(f64, Refined)> {
-        self.by_rollouts_in(ITERATIONS, problem, chosen)
+    /// A configuration fitted by rollouts, between two linearisations.
+    pub(crate) fn by_rollouts(&self, problem: &Quadratic, chosen: &[usize]) -> Option<Refined> {
+        let linear = configuration(problem, self.dispersion, self.terms, chosen)?;
+        self.refined(ITERATIONS, chosen, &linear.step, None)
     }
 
-    /// The same, as far as it goes.
+    /// The same, as far as it goes. `near`: another one that is fitted, and which one; what tells them apart is added by the linearisation.
     pub(crate) fn by_rollouts_to_the_end(
         &self,
         problem: &Quadratic,
         chosen: &[usize],
-    ) -> Option<(f64, Refined)> {
-        self.by_rollouts_in(ITERATIONS_TO_THE_END, problem, chosen)
+        near: Option<(&[usize], &Refined)>,
+    ) -> Option<Refined> {
+        let linear = |chosen: &[usize]| {
+            configuration(problem, self.dispersion, self.terms, chosen).map(|found| found.step)
+        };
+        let step = linear(chosen)?;
+        let near = near.and_then(|(other, fitted)| {
+            let (apart, has) = (&step - linear(other)?, self.in_use(other));
+            let at = |c: usize| {
+                if has[c] { fitted.values[c] + apart[c] } else { self.values[c] + step[c] }
+            };
+            let values = (0..self.values.len()).map(at).collect();
+            Some(Refined { values, starts: fitted.starts.clone() })
+        });
+        self.refined(ITERATIONS_TO_THE_END, chosen, &step, near)
     }
 
-    fn by_rollouts_in(
+    /// The model of a configuration fitted by rollouts, from where the linear step leads, where the linearisation is, or `near`, whichever is best. Terms
+    /// that it has only as little of as any car are absent there, but for those that every car has.
+    fn refined(
         &self,
         iterations: usize,
-        problem: &Quadratic,
         chosen: &[usize],
-    ) -> Option<(f64, Refined)> {
-        let linear = configuration(problem, self.dispersion, self.terms, chosen)?;
-        let (refined, cost) = self.refined(iterations, chosen, &linear.step);
-        let log = linear.log_occam - 0.5 * cost / self.dispersion;
-        log.is_finite().then_some((log, refined))
-    }
-
-    /// The model of a configuration fitted by rollouts, and its cost with the priors' share. Terms that it has only as little of as any car are absent
-    /// there, but for those that every car has.
-    fn refined(&self, iterations: usize, chosen: &[usize], step: &DVector<f64>) -> (Refined, f64) {
+        step: &DVector<f64>,
+        near: Option<Refined>,
+    ) -> Option<Refined> {
         let Self { engine, columns, terms, values, starts, windows, dispersion, .. } = *self;
         let in_use = self.in_use(chosen);
         let mut target = columns.blank(engine);
@@ -151,33 +160,39 @@ impl Around<'_, '_> {
                 }),
             });
         }
-        let from = |parameters: &[Parameter]| {
-            let problem = engine.problem(&model, &windows.windows, parameters, iterations);
-            shooting::descend(&problem, Some(starts.to_vec()))
+        let linear = Refined {
+            values: values.iter().zip(step.iter()).map(|(v, s)| v + s).collect(),
+            starts: starts.to_vec(),
         };
-        let mut best = from(&parameters);
-        // A linear step may lead too far: a fit ends no worse than where the linearisation is.
-        let mut here = parameters.clone();
-        here.iter_mut()
-            .zip(&map)
-            .filter(|(p, _)| p.free)
-            .for_each(|(p, &c)| p.start = values[c].clamp(p.low, p.high));
-        let at: Vec<f64> = here.iter().map(|p| p.start).collect();
-        let problem = engine.problem(&model, &windows.windows, &here, 0);
-        let cost = shooting::evaluate(&problem, &at, starts).cost;
-        if best.at.cost.total_cmp(&cost).is_gt() {
-            let again = from(&here);
-            if best.at.cost.total_cmp(&again.at.cost).is_gt() {
-                best = again;
-            }
-        }
+        let here = Refined { values: values.to_vec(), starts: starts.to_vec() };
+        let (cost, begin) = [linear, here]
+            .into_iter()
+            .chain(near)
+            .map(|begin| {
+                let at: Vec<f64> = parameters
+                    .iter()
+                    .zip(&map)
+                    .map(|(p, &c)| if p.free { begin.values[c].clamp(p.low, p.high) } else { p.start })
+                    .collect();
+                let problem = engine.problem(&model, &windows.windows, &parameters, 0);
+                let cost = shooting::evaluate(&problem, &at, &begin.starts).cost;
+                (cost, (at, begin.starts))
+            })
+            .min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (at, begin) = begin;
+        parameters.iter_mut().zip(at).for_each(|(p, at)| p.start = at);
+        let problem = Problem {
+            tolerance: SETTLED * dispersion / cost,
+            ..engine.problem(&model, &windows.windows, &parameters, iterations)
+        };
+        let best = shooting::descend(&problem, Some(begin));
         for (&column, &v) in map.iter().zip(&best.parameters) {
             target[column] = v;
         }
-        (Refined { values: target, starts: best.starts }, best.at.cost)
+        best.at.cost.is_finite().then_some(Refined { values: target, starts: best.starts })
     }
 
-    /// The same near the linearisation, for a look: by steps whose derivatives stay those of the linearisation (chord steps), so that each costs
+    /// Logarithm of a configuration's evidence by rollouts near the linearisation, its prior weight counted, for a look: by steps whose derivatives stay those of the linearisation (chord steps), so that each costs
     /// one plain rollout.
     pub(crate) fn nearby(&self, problem: &Quadratic, chosen: &[usize]) -> Option<(f64, Refined)> {
         let Configuration { step, log_occam, .. } =
@@ -356,7 +371,7 @@ impl Around<'_, '_> {
                 out.push((i, loss));
             }
         }
-        let (_, fitted) = self.by_rollouts(problem, &chosen)?;
+        let fitted = self.by_rollouts(problem, &chosen)?;
         Some(Pruned { chosen, fitted, losses: out })
     }
 }

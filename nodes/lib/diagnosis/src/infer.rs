@@ -108,7 +108,7 @@ pub(crate) fn infer(
         };
         let last = rounds == ROUNDS;
         if chosen.as_ref() != Some(&selection.best) && !last {
-            let (_, fitted) = around.by_rollouts(&weighed.total, &selection.best)?;
+            let fitted = around.by_rollouts(&weighed.total, &selection.best)?;
             (values, starts) = (fitted.values, fitted.starts);
             chosen = Some(selection.best);
             continue;
@@ -125,7 +125,7 @@ pub(crate) fn infer(
             let confirmed = around.confirmed(&weighed.total, &selection, &losses)?;
             progress("asking data that nothing was fitted to");
             let Stated { chosen: best, fitted, statements: mut stated } =
-                around.stated(&weighed, best, closed, scorer)?;
+                around.stated(&weighed, (best, fitted), closed, scorer)?;
             let sizes = Sizes::of(&around, library, &best, &fitted, windows)?;
             for statement in &mut stated {
                 let effect = columns.effects[statement.term - FIRST];
@@ -223,7 +223,7 @@ pub(crate) fn linearised(
             joint: &joint,
             scale: &scale,
         };
-        let (_, fitted) = around.by_rollouts(&weighed.total, chosen)?;
+        let fitted = around.by_rollouts(&weighed.total, chosen)?;
         (values, starts) = (fitted.values, fitted.starts);
     }
     None

@@ -6,18 +6,19 @@
 //! delta_k = (A - H_k/phi)^-1 g_k/phi
 //! ```
 //!
-//! away (one Newton step, as in approximate leave-one-out cross-validation: Beirami et al. 2017), and the block is run there, with start states of its
-//! own. g_k, H_k: half gradient and information of the block, both at the fit; A: information over the dispersion phi, with the priors. What only one
+//! away (one Newton step, as in approximate leave-one-out cross-validation: Beirami et al. 2017), and the block is run there, its start states moved
+//! along. g_k, H_k: half gradient and information of the block, both at the fit; A: information over the dispersion phi, with the priors. What only one
 //! block asks for gets no credit, however well it fits there.
 
 use gripsight_estimation::selection::{ColumnPrior, Term};
 use gripsight_estimation::shooting::{self, Parameter};
 use nalgebra::{DMatrix, DVector};
+use std::sync::OnceLock;
 
 use crate::around::{Around, Refined};
 use crate::budget::Scorer;
 
-/// Iterations of the fit of start states, and where the model is but a step from a fitted one.
+/// Iterations of the fit of start states, and where those of another model are at hand.
 const START_ITERATIONS: usize = 6;
 const START_ITERATIONS_NEARBY: usize = 2;
 
@@ -44,17 +45,29 @@ impl Around<'_, '_> {
         scorer: &Scorer<'_>,
         chosen: &[usize],
         fitted: &Refined,
+        starts: &OnceLock<Vec<[f64; 2]>>,
     ) -> f64 {
-        let apart = if scorer.is_apart() { self.cost_apart(scorer, chosen, &fitted.values) } else { 0.0 };
+        let apart =
+            if scorer.is_apart() { self.cost_apart(scorer, chosen, &fitted.values, starts) } else { 0.0 };
         apart + self.cost_left_out(terms, chosen, fitted).unwrap_or(f64::NAN)
     }
 
-    /// The same on the data held out alone.
-    fn cost_apart(&self, scorer: &Scorer<'_>, chosen: &[usize], values: &[f64]) -> f64 {
+    /// The same on the data held out alone. `starts`: where the first model that was looked at starts there.
+    fn cost_apart(
+        &self,
+        scorer: &Scorer<'_>,
+        chosen: &[usize],
+        values: &[f64],
+        starts: &OnceLock<Vec<[f64; 2]>>,
+    ) -> f64 {
         let (model, own, _) = self.model(&scorer.engine, chosen, values);
         let parameters: Vec<Parameter> = own.iter().map(|&v| Own::fixed(v)).collect();
-        let problem = self.engine.problem(&model, &scorer.windows.windows, &parameters, START_ITERATIONS);
-        shooting::descend(&problem, None).at.cost
+        let from = starts.get().cloned();
+        let iterations = if from.is_some() { START_ITERATIONS_NEARBY } else { START_ITERATIONS };
+        let problem = self.engine.problem(&model, &scorer.windows.windows, &parameters, iterations);
+        let end = shooting::descend(&problem, from);
+        starts.get_or_init(|| end.starts);
+        end.at.cost
     }
 
     /// The columns of a configuration's model, in the model's order. What has come to its bound stays there.
@@ -106,13 +119,15 @@ impl Around<'_, '_> {
             let mut steps = step.iter();
             let moved = |o: &Own| {
                 let by = o.precision.and_then(|_| steps.next()).unwrap_or(&0.0);
-                Own::fixed((o.value + by).clamp(o.bounds[0], o.bounds[1]))
+                (o.value + by).clamp(o.bounds[0], o.bounds[1])
             };
-            let parameters: Vec<Parameter> = own.iter().map(moved).collect();
+            let values: Vec<f64> = own.iter().map(moved).collect();
+            let taken =
+                own.iter().zip(&values).filter(|(o, _)| o.precision.is_some()).map(|(o, v)| v - o.value);
+            let starts = at.starts_after(&DVector::from_iterator(step.len(), taken), &fitted.starts);
             let windows = &self.windows.windows[block.windows.clone()];
-            let starts = fitted.starts[block.windows.clone()].to_vec();
-            let problem = self.engine.problem(&model, windows, &parameters, START_ITERATIONS_NEARBY);
-            Some(shooting::descend(&problem, Some(starts)).at.cost)
+            let problem = self.engine.problem(&model, windows, &parameters, 0);
+            Some(shooting::evaluate(&problem, &values, &starts[block.windows.clone()]).cost)
         };
         blocks.iter().map(without).sum()
     }

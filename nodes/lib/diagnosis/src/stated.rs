@@ -1,5 +1,8 @@
 //! What survives on data that nothing was fitted to.
 
+use std::collections::HashMap;
+use std::sync::{Mutex, OnceLock};
+
 use gripsight_estimation::selection::{Term, configuration};
 use gripsight_model::Site;
 use rayon::prelude::*;
@@ -28,6 +31,13 @@ struct Tried {
     fitted: Refined,
     /// Robust sum of squares on data that it was not fitted to.
     cost: f64,
+}
+
+impl Tried {
+    /// Which configuration it is, and its fit.
+    fn place(&self) -> Option<(&[usize], &Refined)> {
+        Some((&self.chosen, &self.fitted))
+    }
 }
 
 /// An effect that all data make likelier than not.
@@ -60,21 +70,22 @@ impl Around<'_, '_> {
     }
 
     /// Asks data that nothing was fitted to. Their predictive ratio, times the odds before the data are looked at, decides what is in the model.
-    /// `start`: the most probable configuration by the fitted data; `alone`: that of effects alone.
+    /// `start`: the most probable configuration by the fitted data, and its fit; `alone`: that of effects alone.
     pub(crate) fn stated(
         &self,
         weighed: &Weighed,
-        start: Vec<usize>,
+        (start, fitted): (Vec<usize>, Refined),
         alone: Option<Vec<usize>>,
         scorer: &Scorer<'_>,
     ) -> Option<Stated> {
-        let asked = Asked { around: self, weighed, scorer, worst: f64::INFINITY };
-        let nothing = asked.fitted(vec![0; start.len()])?;
+        let (fits, starts) = (Mutex::default(), OnceLock::new());
+        let asked = Asked { around: self, weighed, scorer, fits, starts, worst: f64::INFINITY };
+        let nothing = asked.fitted(vec![0; start.len()], None)?;
         let asked = Asked { worst: nothing.cost, ..asked };
-        let mut now = asked.fitted(start)?;
+        let mut now = asked.fitted(start.clone(), Some((&start, &fitted)))?;
         // The best of effects alone, where it does as well: free terms may do, roughly, what an effect does.
         if let Some(alone) = alone.filter(|a| *a != now.chosen) {
-            let alone = asked.fitted(alone)?;
+            let alone = asked.fitted(alone, now.place())?;
             if 1.0 - now.cost / alone.cost < decisions::LEAST_CLOSED {
                 now = alone;
             }
@@ -115,6 +126,10 @@ struct Asked<'q, 'p, 'a, 's> {
     scorer: &'q Scorer<'s>,
     /// Cost with no effect at all.
     worst: f64,
+    /// What was fitted already.
+    fits: Mutex<HashMap<Vec<usize>, Option<Tried>>>,
+    /// Start states of the first of them on the data held out.
+    starts: OnceLock<Vec<[f64; 2]>>,
 }
 
 impl Asked<'_, '_, '_, '_> {
@@ -128,24 +143,34 @@ impl Asked<'_, '_, '_, '_> {
         (decisions::PRIOR / (1.0 - decisions::PRIOR)).ln() + self.log_ratio(simpler, fuller)
     }
 
-    /// A configuration fitted by rollouts.
-    fn fitted(&self, chosen: Vec<usize>) -> Option<Tried> {
-        self.tried(chosen, |around, chosen| around.by_rollouts_to_the_end(&self.weighed.total, chosen))
+    /// A configuration fitted by rollouts; `near`: another one with its fit.
+    fn fitted(&self, chosen: Vec<usize>, near: Option<(&[usize], &Refined)>) -> Option<Tried> {
+        let known = |fits: &HashMap<_, Option<Tried>>| fits.get(&chosen).cloned();
+        if let Some(found) = self.fits.lock().ok().and_then(|fits| known(&fits)) {
+            return found;
+        }
+        let found = self.tried(chosen.clone(), |around, chosen| {
+            around.by_rollouts_to_the_end(&self.weighed.total, chosen, near)
+        });
+        if let Ok(mut fits) = self.fits.lock() {
+            fits.insert(chosen, found.clone());
+        }
+        found
     }
 
     /// A configuration fitted near the linearisation, for a look.
     fn nearby(&self, chosen: Vec<usize>) -> Option<Tried> {
-        self.tried(chosen, |around, chosen| around.nearby(&self.weighed.total, chosen))
+        self.tried(chosen, |around, chosen| Some(around.nearby(&self.weighed.total, chosen)?.1))
     }
 
     fn tried(
         &self,
         chosen: Vec<usize>,
-        fit: impl Fn(&Around<'_, '_>, &[usize]) -> Option<(f64, Refined)>,
+        fit: impl Fn(&Around<'_, '_>, &[usize]) -> Option<Refined>,
     ) -> Option<Tried> {
         let terms = self.around.lacking(&chosen);
-        let (_, fitted) = fit(&Around { terms: &terms, ..*self.around }, &chosen)?;
-        let cost = self.around.predictive_cost(&terms, self.scorer, &chosen, &fitted);
+        let fitted = fit(&Around { terms: &terms, ..*self.around }, &chosen)?;
+        let cost = self.around.predictive_cost(&terms, self.scorer, &chosen, &fitted, &self.starts);
         Some(Tried { chosen, fitted, cost })
     }
 
@@ -155,7 +180,7 @@ impl Asked<'_, '_, '_, '_> {
         part.iter().for_each(|&i| chosen[i] = 0);
         let near = self.nearby(chosen.clone());
         // Worse than with no effect at all: too far away for a look.
-        near.filter(|n| n.cost <= self.worst).or_else(|| self.fitted(chosen))
+        near.filter(|n| n.cost <= self.worst).or_else(|| self.fitted(chosen, from.place()))
     }
 
     /// The effects of a configuration, by term, or those that it lacks.
@@ -228,7 +253,7 @@ impl Asked<'_, '_, '_, '_> {
                 .collect();
             looked_at.sort_by(|a, b| b.1.total_cmp(&a.1));
             let likely = |(i, _): (usize, f64)| {
-                self.fitted(with(i)).filter(|fuller| self.log_odds(now.cost, fuller.cost) > 0.0)
+                self.fitted(with(i), now.place()).filter(|fuller| self.log_odds(now.cost, fuller.cost) > 0.0)
             };
             match looked_at.into_iter().take(FITTED).find_map(likely) {
                 Some(fuller) => now = fuller,
@@ -250,7 +275,8 @@ impl Asked<'_, '_, '_, '_> {
             // A look from nearby may end short of what the others can do: those that seem needed least are fitted.
             simpler.sort_by(|a, b| log_odds(a).total_cmp(&log_odds(b)));
             simpler.par_iter_mut().take(FITTED).for_each(|(_, lacking)| {
-                let better = self.fitted(lacking.chosen.clone()).filter(|b| b.cost < lacking.cost);
+                let better =
+                    self.fitted(lacking.chosen.clone(), lacking.place()).filter(|b| b.cost < lacking.cost);
                 if let Some(better) = better {
                     *lacking = better;
                 }
@@ -280,7 +306,7 @@ impl Asked<'_, '_, '_, '_> {
                 let mut chosen = now.chosen.clone();
                 chosen[term] = 0;
                 chosen[rival] = 1;
-                let tried = self.fitted(chosen).filter(|t| t.cost.is_finite())?;
+                let tried = self.fitted(chosen, now.place()).filter(|t| t.cost.is_finite())?;
                 Some((rival, tried))
             };
             let rivals: Vec<usize> = self.effects(&now, false).into_iter().filter(alike).collect();
