@@ -222,9 +222,11 @@ impl Around<'_, '_> {
             data + if r == c { free[r].precision } else { 0.0 }
         });
         let solver = matrix.cholesky()?;
+        let by: Vec<usize> = free.iter().map(|f| f.column).collect();
         let at = |values: &[f64], starts: &[[f64; 2]]| {
             let (model, own, _) = self.model(self.engine, chosen, values);
-            let trial = self.joint.trial(self.engine, &model, &own, starts, self.windows, self.scale)?;
+            let trial =
+                self.joint.trial(self.engine, (&model, &own), starts, self.windows, self.scale, &by)?;
             let cost = trial.cost / self.dispersion + prior(values);
             cost.is_finite().then_some((cost, trial))
         };
@@ -253,12 +255,10 @@ impl Around<'_, '_> {
         };
         for _ in 0..STEPS {
             starts = shifted(&starts, &trial.shifts);
-            let pull = DVector::from_iterator(
-                free.len(),
-                free.iter().map(|f| {
-                    -trial.gradient[f.column] / self.dispersion - f.precision * (values[f.column] - f.mean)
-                }),
-            );
+            let pull = DVector::from_fn(free.len(), |i, _| {
+                let f = &free[i];
+                -trial.gradient[i] / self.dispersion - f.precision * (values[f.column] - f.mean)
+            });
             let by = solver.solve(&pull);
             let next = [1.0, 0.3].into_iter().find_map(|share| {
                 let there = moved(&values, &by, share);

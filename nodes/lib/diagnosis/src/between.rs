@@ -63,14 +63,15 @@ impl Pulls {
         let Inferred { weighed, terms, dispersion, .. } = drive;
         let open: Vec<usize> = terms.iter().map(|t| t.log_weights.len() - 1).collect();
         let all = configuration(&weighed.total, *dispersion, terms, &open)?;
-        let precision = all.covariance.clone().cholesky()?.inverse();
+        let covariance = all.covariance();
+        let precision = covariance.clone().cholesky()?.inverse();
         let pull = |block: &Quadratic| {
             let score = (&block.gradient + &block.information * &all.step) / *dispersion;
             let without = &precision - &block.information / *dispersion;
             Some((block.information.clone(), without.cholesky()?.solve(&score)))
         };
         let blocks = weighed.blocks.iter().map(pull).collect::<Option<_>>()?;
-        Some(Self { step: all.step, covariance: all.covariance, blocks })
+        Some(Self { step: all.step, covariance, blocks })
     }
 }
 

@@ -75,7 +75,7 @@ pub(crate) fn detection_limits(engine: &Engine<'_>, inferred: &Inferred) -> Vec<
         let term = inferred.term_of(effect)?;
         let mut chosen = inferred.selection.best.clone();
         chosen[term] = inferred.terms[term].log_weights.len() - 1;
-        let covariance = configuration(problem, inferred.dispersion, &inferred.terms, &chosen)?.covariance;
+        let covariance = configuration(problem, inferred.dispersion, &inferred.terms, &chosen)?.covariance();
         let from = inferred.terms[term].from;
         let parameters = effect.spec().parameters.iter().take(effect.sizing()).enumerate();
         let sized = inferred.sizes.effect(&inferred.columns, effect);

@@ -23,7 +23,7 @@ use crate::sizes::{Sizes, told};
 use crate::state::State;
 use crate::stated::Stated;
 use gripsight_estimation::Windows;
-use gripsight_estimation::selection::{Configuration, Quadratic, Term, configuration, select};
+use gripsight_estimation::selection::{Quadratic, Term, configuration, select};
 use gripsight_model::BASE;
 use gripsight_model::EffectId;
 use gripsight_model::{Flexible, Site, Window};
@@ -249,14 +249,15 @@ pub(crate) fn noise_scale(
 
 /// How much larger the scatter of the blocks' gradients is than that of independent errors, at the best model with all terms open.
 pub(crate) fn repeated(weighed: &Weighed, terms: &[Term], open: &[usize]) -> Option<f64> {
-    let Configuration { step, covariance, .. } = configuration(&weighed.total, 1.0, terms, open)?;
+    let found = configuration(&weighed.total, 1.0, terms, open)?;
+    let (step, covariance) = (&found.step, found.covariance());
     // Directions that the data know: H C is the share of the data in each.
     let known: f64 = (&weighed.total.information * &covariance).trace();
     let scatter: f64 = weighed
         .blocks
         .iter()
         .map(|b: &Quadratic| {
-            let g: DVector<f64> = &b.gradient + &b.information * &step;
+            let g: DVector<f64> = &b.gradient + &b.information * step;
             (g.transpose() * &covariance * &g)[(0, 0)]
         })
         .sum();

@@ -221,7 +221,7 @@ impl Joint {
 pub(crate) struct Trial {
     /// Robust weighted sum of squares, start states at their best.
     pub(crate) cost: f64,
-    /// Half its derivative by each column.
+    /// Half its derivative by each of the columns asked for.
     pub(crate) gradient: DVector<f64>,
     /// How far the best start states are from those given.
     pub(crate) shifts: Vec<[f64; 2]>,
@@ -233,11 +233,11 @@ impl Joint {
     pub(crate) fn trial(
         &self,
         engine: &Engine<'_>,
-        model: &ExtendedModel<'_>,
-        own: &[f64],
+        (model, own): (&ExtendedModel<'_>, &[f64]),
         starts: &[[f64; 2]],
         windows: &Windows,
         scale: &[f64],
+        by: &[usize],
     ) -> Option<Trial> {
         let parts: Vec<(f64, DVector<f64>, [f64; 2])> = self
             .parts
@@ -253,11 +253,11 @@ impl Joint {
                     part.channel.len(),
                     kept.zip(&part.channel).map(|((m, p), &c)| (m - p) / engine.sigma[c]),
                 );
-                part.looked_at(residual, scale)
+                part.looked_at(residual, scale, by)
             })
             .collect();
         let shifts = parts.iter().map(|p| p.2).collect();
-        let zero = (0.0, DVector::zeros(self.columns));
+        let zero = (0.0, DVector::zeros(by.len()));
         let (cost, gradient) = parts.iter().fold(zero, |(c, g), p| (c + p.0, g + &p.1));
         let out = Trial { cost, gradient, shifts };
         (out.cost.is_finite() && out.gradient.iter().all(|g| g.is_finite())).then_some(out)
@@ -282,7 +282,12 @@ impl Part {
     }
 
     /// Cost, half its gradient, and the shift of the start state, for other residuals under the present noise.
-    fn looked_at(&self, residual: DVector<f64>, scale: &[f64]) -> (f64, DVector<f64>, [f64; 2]) {
+    fn looked_at(
+        &self,
+        residual: DVector<f64>,
+        scale: &[f64],
+        by: &[usize],
+    ) -> (f64, DVector<f64>, [f64; 2]) {
         let n = residual.len() as f64;
         let start =
             DMatrix::from_fn(self.start.nrows(), 2, |r, c| self.start[(r, c)] / scale[self.channel[r]]);
@@ -293,7 +298,8 @@ impl Part {
         let left = residual - &start * &shift;
         let (weight, cost) = robust(left.norm_squared(), n);
         let weighed = DVector::from_fn(left.len(), |r, _| left[r] / scale[self.channel[r]]);
-        (cost, self.jacobian.tr_mul(&weighed) * -weight, [shift[0], shift[1]])
+        let slope = by.iter().map(|&c| -weight * self.jacobian.column(c).dot(&weighed));
+        (cost, DVector::from_iterator(by.len(), slope), [shift[0], shift[1]])
     }
 
     fn without_columns(&self) -> Self {
@@ -309,8 +315,13 @@ impl Part {
     /// Residuals and derivatives with the start state taken out.
     fn projected(&self, scale: &[f64]) -> (DVector<f64>, DMatrix<f64>, DMatrix<f64>) {
         let weights: Vec<f64> = self.channel.iter().map(|&c| 1.0 / scale[c]).collect();
-        let by = |m: &DMatrix<f64>| DMatrix::from_fn(m.nrows(), m.ncols(), |r, c| m[(r, c)] * weights[r]);
-        let residual = DVector::from_fn(self.residual.len(), |r, _| self.residual[r] * weights[r]);
+        let weights = DVector::from_vec(weights);
+        let by = |m: &DMatrix<f64>| {
+            let mut out = m.clone();
+            out.column_iter_mut().for_each(|mut column| column.component_mul_assign(&weights));
+            out
+        };
+        let residual = self.residual.component_mul(&weights);
         let (jacobian, start) = (by(&self.jacobian), by(&self.start));
         let square = start.tr_mul(&start) + DMatrix::identity(2, 2) * 1e-12;
         let Some(inverse) = square.try_inverse() else { return (residual, jacobian, start) };

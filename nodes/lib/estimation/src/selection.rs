@@ -13,7 +13,7 @@
 //! "Variable selection via Gibbs sampling"). A change of one term is an update of rank k, so a sweep over a hundred terms costs less than one
 //! rollout of the car.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -227,8 +227,15 @@ pub struct Configuration {
     pub log_occam: f64,
     /// Mean step of all columns.
     pub step: DVector<f64>,
+    precision: Cholesky<f64, Dyn>,
+}
+
+impl Configuration {
     /// Covariance of all columns.
-    pub covariance: DMatrix<f64>,
+    #[must_use]
+    pub fn covariance(&self) -> DMatrix<f64> {
+        self.precision.inverse()
+    }
 }
 
 /// Evidence, step and covariance of one configuration; `None` where it is singular or not finite.
@@ -250,7 +257,8 @@ pub fn configuration(
         covariance: DMatrix::zeros(0, 0),
         mean: DVector::zeros(0),
     };
-    let log_evidence = sampler.refresh()? - sampler.log_weight();
+    let (log_evidence, precision) = sampler.solved()?;
+    let log_evidence = log_evidence - sampler.log_weight();
     let step = sampler.mean.clone();
     // Twice the drop of the cost, less what the priors take.
     let data = -2.0 * scaled.gradient.dot(&step) - (&scaled.information * &step).dot(&step);
@@ -261,7 +269,7 @@ pub fn configuration(
         .map(|(t, a, c, column)| (step[column] - t.priors[c].offset).powi(2) * t.precision(c, a))
         .sum();
     let log_occam = log_evidence - 0.5 * (data - priors) + sampler.log_weight();
-    Some(Configuration { log_evidence, log_occam, step, covariance: sampler.covariance })
+    Some(Configuration { log_evidence, log_occam, step, precision })
 }
 
 /// Logarithm of how much more of a term's posterior than of its prior lies within the bounds: columns taken one by one.
@@ -327,6 +335,13 @@ impl Sampler<'_> {
 
     /// Covariance and mean from scratch; the logarithm of evidence times prior weight.
     fn refresh(&mut self) -> Option<f64> {
+        let (evidence, precision) = self.solved()?;
+        self.covariance = precision.inverse();
+        Some(evidence)
+    }
+
+    /// The mean from scratch; the logarithm of evidence times prior weight, and the precision of all columns.
+    fn solved(&mut self) -> Option<(f64, Cholesky<f64, Dyn>)> {
         let n = self.problem.gradient.len();
         let mut a = self.problem.information.clone();
         let mut b = -&self.problem.gradient;
@@ -344,9 +359,8 @@ impl Sampler<'_> {
         let cholesky = a.cholesky()?;
         let log_det: f64 = (0..n).map(|i| cholesky.l_dirty()[(i, i)].ln()).sum();
         self.mean = cholesky.solve(&b);
-        self.covariance = cholesky.inverse();
         let evidence = 0.5 * b.dot(&self.mean) - 0.5 * quadratic + log_prior - log_det + self.log_weight();
-        evidence.is_finite().then_some(evidence)
+        evidence.is_finite().then_some((evidence, cholesky))
     }
 
     /// Columns of changed terms with the change of their precisions and their offsets.
@@ -550,7 +564,8 @@ mod tests {
         );
         let expected = sampler.moments(0, 1);
         sampler.change(&[(0, 1)]);
-        let Configuration { step: mean, covariance, .. } = all(&[1, 0, 0]);
+        let found = all(&[1, 0, 0]);
+        let (mean, covariance) = (found.step.clone(), found.covariance());
         approx::assert_relative_eq!(expected[0][0], mean[0], max_relative = 1e-8);
         approx::assert_relative_eq!(expected[0][1], covariance[(0, 0)], max_relative = 1e-8);
         approx::assert_relative_eq!(sampler.mean, mean, max_relative = 1e-7, epsilon = 1e-10);
