@@ -131,7 +131,7 @@ def nodes(context):
         topics_in = [("sequence", "telemetry/sequence"), ("posterior", "identifier/posterior")]
         started.append(node("gap_diagnosis", topics_in, prefix="nice -n 10"))
     if value["drive"]:
-        topics_in = [*remaps("odom", "drive"), ("pacejka", "identifier/pacejka"), ("grip", "identifier/grip"), ("extended_model", "gap_diagnosis/extended_model")]
+        topics_in = [*remaps("odom", "drive"), ("pacejka", "identifier/pacejka"), ("grip", "identifier/grip"), ("progress", "identifier/progress"), ("extended_model", "gap_diagnosis/extended_model")]
         started.append(node("driver", topics_in, defaults=[value["drive"]]))
     if value["bag"]:
         player = Node(

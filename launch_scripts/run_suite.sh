@@ -163,7 +163,7 @@ fi
 if [[ -n $drive ]]; then
     # The car waits for nobody.
     priority=()
-    start driver --params-file "$drive" "${motion[@]}" -r pacejka:=identifier/pacejka -r grip:=identifier/grip -r extended_model:=gap_diagnosis/extended_model
+    start driver --params-file "$drive" "${motion[@]}" -r pacejka:=identifier/pacejka -r grip:=identifier/grip -r progress:=identifier/progress -r extended_model:=gap_diagnosis/extended_model
 fi
 if [[ -z $bag ]]; then
     wait_for none

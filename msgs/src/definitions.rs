@@ -12,6 +12,7 @@ macro_rules! definitions {
 /// Full name and text of every message type.
 const DEFINITIONS: &[(&str, &str)] = definitions! {
     "msg": "gripsight_msgs" {
+        "DriveNext"
         "Excitation"
         "ExtendedModel"
         "FrictionPrior"

@@ -13,7 +13,7 @@ pub use common::{Handshake, Interval, Range};
 pub use friction::FrictionPrior;
 pub use gap::{ExtendedModel, GapEffect, GapParameter, GapRegion, GapReport};
 pub use longitudinal::{Longitudinal, LongitudinalLimit};
-pub use progress::IdentificationProgress;
+pub use progress::{DriveNext, IdentificationProgress};
 pub use residual::{Residual, ResidualModel};
 pub use sequence::{Excitation, StateSequence};
 pub use tires::{Grip, MagicFormula, PacejkaParams, PeakFriction, SignalCorrections, TirePosterior};

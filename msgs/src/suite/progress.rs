@@ -26,8 +26,28 @@ pub struct IdentificationProgress {
     pub extrapolated_share: f64,
     /// Since the run started (s).
     pub elapsed_s: f64,
+    /// What to drive next, the most telling first; empty before the run is over.
+    pub drive_next: Vec<DriveNext>,
     /// The same for a person.
     pub text: String,
+}
+
+/// What to drive, so that the next identification tells more.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DriveNext {
+    /// `turn_ins`, `corner_harder`, `corners_both_ways`, `same_corners_at_two_speeds`, `drive_on`, `each_floor_by_itself` or
+    /// `measure_lateral_velocity`.
+    pub manoeuvre: String,
+    /// Forward speed to do it at (m/s); NaN: any.
+    pub v_x_mps: f64,
+    /// Lateral acceleration to go to (m/s2); NaN: that of the line.
+    pub a_y_mps2: f64,
+    /// The same for a person.
+    pub why: String,
+}
+
+impl Message for DriveNext {
+    const TYPE: &'static str = "gripsight_msgs/msg/DriveNext";
 }
 
 impl IdentificationProgress {

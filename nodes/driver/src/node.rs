@@ -8,14 +8,14 @@ use gripsight_identification::vehicle_hash;
 use gripsight_msgs::standard::ackermann_msgs::{AckermannDrive, AckermannDriveStamped};
 use gripsight_msgs::standard::nav_msgs::Odometry;
 use gripsight_msgs::standard::std_msgs::Header;
-use gripsight_msgs::{ExtendedModel, Grip, PacejkaParams};
+use gripsight_msgs::{ExtendedModel, Grip, IdentificationProgress, PacejkaParams};
 use gripsight_runtime::{Clock, Diagnostics, Node, Publisher, Qos};
 use tokio::time::MissedTickBehavior;
 
 use crate::diagnostics::{Facts, status};
 use crate::laps::{Lap, Laps};
 use crate::model::{self, Tried};
-use crate::sets::{Said, longitudinal, read};
+use crate::sets::{Said, asks_for_turn_ins, longitudinal, read};
 use crate::settings::Settings;
 
 /// Depth of the command's queue: only the newest counts.
@@ -30,6 +30,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
     let mut sets = node.subscription::<PacejkaParams>("pacejka", Qos::latched())?;
     let mut models = node.subscription::<ExtendedModel>("extended_model", Qos::latched())?;
     let mut grips = node.subscription::<Grip>("grip", Qos::latched())?;
+    let mut runs = node.subscription::<IdentificationProgress>("progress", Qos::latched())?;
     node.needs([odometry.arrivals()]);
     let hash = vehicle_hash(&settings.vehicle);
     let mut wheel = Wheel {
@@ -56,6 +57,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
                 Some(message) = sets.next() => wheel.take(&message, &hash),
                 Some(message) = models.next() => wheel.try_model(&message, &hash),
                 Some(message) = grips.next() => wheel.feel(&message, &hash),
+                Some(message) = runs.next() => wheel.ask(&message, &hash),
                 _ = ticks.tick() => wheel.look().await,
                 else => return Ok(()),
             }
@@ -146,6 +148,13 @@ impl Wheel {
             self.fallen = Some((message.handshake.sequence_id, message.share));
             self.driver.warn(Some(message.share));
             tracing::warn!("planning with a grip of {:.3}: {}", self.driver.grip(), message.text);
+        }
+    }
+
+    /// What a run of the identification wants to be driven next.
+    fn ask(&mut self, message: &IdentificationProgress, hash: &str) {
+        if message.stage == IdentificationProgress::FINISHED && message.handshake.vehicle_hash == hash {
+            self.driver.ask_for_turn_ins(asks_for_turn_ins(&message.drive_next));
         }
     }
 

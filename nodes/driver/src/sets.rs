@@ -1,7 +1,8 @@
 //! The identifier's messages as the driver takes them.
 
 use gripsight_driving::{Actuator, Longitudinal, ReachedAt, TireSet, Trust};
-use gripsight_msgs::{Interval, MagicFormula as FormulaMessage, PacejkaParams};
+use gripsight_identification::Manoeuvre;
+use gripsight_msgs::{DriveNext, Interval, MagicFormula as FormulaMessage, PacejkaParams};
 use gripsight_vehicle::{MagicFormula, PacejkaParameters};
 
 /// What a message says to a driver.
@@ -67,6 +68,11 @@ pub(crate) fn longitudinal(message: &PacejkaParams) -> Longitudinal {
             })
             .collect(),
     }
+}
+
+/// Whether more turn-ins are wanted.
+pub(crate) fn asks_for_turn_ins(next: &[DriveNext]) -> bool {
+    next.iter().filter_map(|next| Manoeuvre::by_name(&next.manoeuvre)).any(Manoeuvre::is_turning_in)
 }
 
 fn formula(m: &FormulaMessage) -> MagicFormula {

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::{Duration, SystemTime};
 
 use gripsight_bag::encode;
-use gripsight_identification::{Candidate, Config, IterationRecord, Outcome, RunKey};
+use gripsight_identification::{Candidate, Config, DriveNext, IterationRecord, Outcome, RunKey};
 use gripsight_identification_messages as messages;
 use gripsight_msgs::standard::std_msgs::Header;
 use gripsight_msgs::{
@@ -147,6 +147,7 @@ impl Outputs {
             cost: last.map_or(f64::NAN, |i| i.fit_rmse),
             extrapolated_share: last.map_or(f64::NAN, |i| i.extrapolated_share),
             elapsed_s: step.elapsed.as_secs_f64(),
+            drive_next: messages::drive_next(step.drive_next),
             text: step.text.clone(),
         };
         self.progress.publish(&message).await;
@@ -162,6 +163,7 @@ pub(crate) struct Step<'a> {
     pub(crate) stage: u8,
     pub(crate) last: Option<&'a IterationRecord>,
     pub(crate) elapsed: Duration,
+    pub(crate) drive_next: &'a [DriveNext],
     pub(crate) text: String,
 }
 

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use gripsight_identification::{
-    AcceptedSet, Candidate, Config, FrictionPrior, Identification, IdentificationError, IterationRecord,
-    Method, Next, Outcome, ResidualModel, RunKey, Started,
+    AcceptedSet, Candidate, Config, DriveNext, FrictionPrior, Identification, IdentificationError,
+    IterationRecord, Method, Next, Outcome, ResidualModel, RunKey, Started,
 };
 use gripsight_identification_messages as messages;
 use gripsight_msgs::{IdentificationProgress as Progress, ResidualModel as ModelMessage};
@@ -69,8 +69,8 @@ impl Run<'_> {
             Started::Running(run) => self.turns(run).await?,
             Started::Refused(outcome) => *outcome,
         };
-        self.step(&outcome.key, Progress::FINISHED, outcome.history.last(), outcome.status.name().to_owned())
-            .await;
+        let (last, text) = (outcome.history.last(), outcome.status.name().to_owned());
+        self.said(&outcome.key, Progress::FINISHED, last, &outcome.drive_next, text).await;
         Ok(outcome)
     }
 
@@ -136,9 +136,20 @@ impl Run<'_> {
     }
 
     async fn step(&self, key: &RunKey, stage: u8, last: Option<&IterationRecord>, text: String) {
+        self.said(key, stage, last, &[], text).await;
+    }
+
+    async fn said(
+        &self,
+        key: &RunKey,
+        stage: u8,
+        last: Option<&IterationRecord>,
+        drive_next: &[DriveNext],
+        text: String,
+    ) {
         (self.on_step)(&text);
         let (sequence, config, elapsed) = (&*self.sequence, &self.config, self.start.elapsed());
-        self.outputs.progress(&Step { key, sequence, config, stage, last, elapsed, text }).await;
+        self.outputs.progress(&Step { key, sequence, config, stage, last, elapsed, drive_next, text }).await;
     }
 }
 

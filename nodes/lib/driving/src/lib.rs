@@ -20,6 +20,7 @@ mod steering;
 mod tires;
 mod track;
 mod trial;
+mod weave;
 
 pub use driver::{Driver, Settings};
 pub use error::DrivingError;

@@ -69,7 +69,7 @@ impl Pursuing {
         let (sin, cos) = car.course_rad().sin_cos();
         let (dx, dy) = (aim.x_m - car.x_m, aim.y_m - car.y_m);
         let away_sq = (dx * dx + dy * dy).max(1e-9);
-        let wanted = 2.0 * speed * speed * (cos * dy - sin * dx) / away_sq;
+        let wanted = 2.0 * speed * speed * (cos * dy - sin * dx) / away_sq + at.weave_mps2;
         let most = table.most_mps2();
         let a = wanted.clamp(-most, most);
         let late_radps = a / speed - car.yaw_rate_radps;

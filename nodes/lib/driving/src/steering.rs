@@ -74,6 +74,8 @@ pub(crate) struct Moment<'a> {
     pub(crate) lag_s: f64,
     /// Nobody measured the tires: the table's limit is not the car's.
     pub(crate) assumed: bool,
+    /// Lateral acceleration on top of what the line asks for: a slalom.
+    pub(crate) weave_mps2: f64,
     pub(crate) speed_gain_1ps: f64,
 }
 

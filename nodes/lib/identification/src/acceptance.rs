@@ -3,13 +3,21 @@
 //! What counts is the error in force over the slips driven and its harm to a controller. A curve that is known to a factor of [`KNOWN_WITHIN`] to either
 //! side is handed on, with no force promised beyond what was shown of it; one that is known worse is not.
 
+use gripsight_vehicle::GRAVITY_MPS2;
+
 use crate::conclude::unstable_at_mps;
 use crate::envelope::{Envelope, KNOWN_WITHIN};
 use crate::tires::MOST_FORCE;
-use crate::{Identification, Outcome, PeakFriction, Range, Status, ValidWithin};
+use crate::{DriveNext, Identification, Manoeuvre, Outcome, PeakFriction, Range, Status, ValidWithin};
 
 /// Scatter of v_y that is said, as a share of the slip at which the rear tires' linear force would meet their peak.
 const V_Y_SHARE: f64 = 0.25;
+
+/// Share of the force shown up to which turn-ins tell the stiffness: where curves bend they tell the peak.
+const TURN_IN_SHARE: f64 = 0.5;
+
+/// Lateral acceleration to go to over that shown, where the peak was not reached.
+const HARDER: f64 = 1.1;
 
 /// No steering that a driver can race with answers later than this.
 const LONGEST_DELAY_S: f64 = 0.2;
@@ -21,7 +29,7 @@ struct Verdict {
     /// The curve is not known well enough where the peak is missing: a friction prior may help.
     unknown: Vec<String>,
     remarks: Vec<String>,
-    drive: Vec<String>,
+    drive: Vec<DriveNext>,
 }
 
 /// Fills in status, set, limits, reasons and advice.
@@ -34,7 +42,7 @@ pub(crate) fn judge(run: &Identification, envelope: &Envelope, outcome: &mut Out
     prediction(run, outcome, &mut verdict);
     stability(run, envelope, outcome, &mut verdict);
     lateral_velocity(outcome, &mut verdict);
-    forces(envelope, outcome, &mut verdict);
+    forces(run, envelope, outcome, &mut verdict);
     peaks(run, outcome, &mut verdict);
     convergence(outcome, &mut verdict);
     signals(run, outcome, &mut verdict);
@@ -79,9 +87,10 @@ fn one_floor(run: &Identification, verdict: &mut Verdict) {
         "the grip changed {:.1} s after the start: D {:.2} -> {:.2} front, {:.2} -> {:.2} rear; one set is true on neither floor",
         change.at_s, then.front.value, now.front.value, then.rear.value, now.rear.value
     ));
-    verdict
-        .drive
-        .push("identify what lies before the change and what lies after it, each by itself".to_owned());
+    verdict.drive.push(
+        Manoeuvre::EachFloorByItself
+            .because("identify what lies before the change and what lies after it, each by itself"),
+    );
 }
 
 /// Parameters that are not finite or on a bound. On a bound is what the drive does not hold: a peak that was not reached, or the shape. No more is promised
@@ -111,10 +120,9 @@ fn lateral_velocity(outcome: &Outcome, verdict: &mut Verdict) {
         scatter_rad.to_degrees(),
         knee_rad.to_degrees(),
     ));
-    verdict.drive.push(
-        "feed a v_y that is measured: motion capture, two antennas, an optical sensor, or an estimator with side slip"
-            .to_owned(),
-    );
+    verdict.drive.push(Manoeuvre::MeasureLateralVelocity.because(
+        "feed a v_y that is measured: motion capture, two antennas, an optical sensor, or an estimator with side slip",
+    ));
 }
 
 /// Whether the tires found say more of held-out data than those that the run began with. A set in use is another matter: it may be as good, and is
@@ -140,7 +148,8 @@ fn stability(run: &Identification, envelope: &Envelope, outcome: &Outcome, verdi
 }
 
 /// Curves that are not known well enough to steer by.
-fn forces(envelope: &Envelope, outcome: &Outcome, verdict: &mut Verdict) {
+fn forces(run: &Identification, envelope: &Envelope, outcome: &Outcome, verdict: &mut Verdict) {
+    let shown = &run.direct.peak;
     let stiffness = &outcome.cornering_stiffness_n_per_rad;
     let (driven, valid) = (&outcome.slip_range_rad, &envelope.valid_within.slip_rad);
     let short = |driven: &Range, valid_rad: f64| {
@@ -167,7 +176,9 @@ fn forces(envelope: &Envelope, outcome: &Outcome, verdict: &mut Verdict) {
         } else {
             continue;
         }
-        verdict.drive.push(format!("drive longer, with more turn-ins below the limit of the {axle} tires"));
+        let why = format!("drive longer, with more turn-ins below the limit of the {axle} tires");
+        let a_y_mps2 = TURN_IN_SHARE * shown.front.height.min(shown.rear.height) * GRAVITY_MPS2;
+        verdict.drive.push(Manoeuvre::TurnIns.because(why).at(outcome.mean_speed_mps).up_to(a_y_mps2));
     }
 }
 
@@ -209,8 +220,11 @@ fn signals(run: &Identification, outcome: &Outcome, verdict: &mut Verdict) {
     }
     if outcome.weak_signals.iter().any(|w| w.name == "steering_gain" || w.name == "v_y_lever_arm_m") {
         drive.push(
-            "the same corners at half and at full speed: gain and lever arm then part from the tires"
-                .to_owned(),
+            Manoeuvre::SameCornersAtTwoSpeeds
+                .because(
+                    "the same corners at half and at full speed: gain and lever arm then part from the tires",
+                )
+                .at(0.5 * outcome.mean_speed_mps),
         );
     }
 }
@@ -258,8 +272,8 @@ fn peaks(run: &Identification, outcome: &Outcome, verdict: &mut Verdict) {
                 format!("{what}; the provisional set rests on the friction prior of {:.2}", prior.mu)
             }
         });
-        drive.push(format!(
-            "corner harder until the {axle} tires slide (more than {furthest:.1} degrees of slip)"
-        ));
+        let why =
+            format!("corner harder until the {axle} tires slide (more than {furthest:.1} degrees of slip)");
+        drive.push(Manoeuvre::CornerHarder.because(why).up_to(HARDER * shown.height * GRAVITY_MPS2));
     }
 }

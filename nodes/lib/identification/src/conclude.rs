@@ -14,10 +14,10 @@ use crate::picture::{curves, trace};
 use crate::rollout::{NAMES, PARAMETERS, SIGNALS, TireRollout, vector_of};
 use crate::tires::on_bound;
 use crate::{
-    Change, Config, Estimate, FrictionPrior, Handling, HorizonError, Identification, IdentificationError,
-    Longitudinal, Nuisance, Outcome, PeakFriction, PerAxle, ProvisionalSet, Range, Recorded, ResidualKind,
-    Rmse, RmseReport, RunKey, SignalCorrections, SignalEstimates, Source, Status, Trace, ValidWithin,
-    WeakSignal,
+    Change, Config, DriveNext, Estimate, FrictionPrior, Handling, HorizonError, Identification,
+    IdentificationError, Longitudinal, Nuisance, Outcome, PeakFriction, PerAxle, ProvisionalSet, Range,
+    Recorded, ResidualKind, Rmse, RmseReport, RunKey, SignalCorrections, SignalEstimates, Source, Status,
+    Trace, ValidWithin, WeakSignal,
 };
 
 /// The residual loop has to beat the direct fit on the validation part by this share: of near equals the simpler wins.
@@ -46,7 +46,7 @@ pub(crate) fn refused(
     request: &Request<'_>,
     health: &DataHealth,
     reasons: Vec<String>,
-    drive_next: Vec<String>,
+    drive_next: Vec<DriveNext>,
 ) -> Outcome {
     let unknown = Estimate::from_error(f64::NAN, None);
     let nowhere = Range { low: f64::NAN, high: f64::NAN };

@@ -9,6 +9,7 @@ mod conclude;
 mod config;
 mod data;
 mod direct;
+mod drive_next;
 mod envelope;
 mod error;
 pub mod export;
@@ -36,6 +37,7 @@ pub use candidate::{
     AcceptedSet, Candidate, Estimate, FrictionPrior, PerAxle, Range, RunKey, SignalCorrections, vehicle_hash,
 };
 pub use config::{Config, Method, ResidualKind};
+pub use drive_next::{DriveNext, Manoeuvre};
 pub use envelope::ValidWithin;
 pub use error::IdentificationError;
 pub use grip::{GripLook, GripWatch};

@@ -5,8 +5,8 @@ use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    AcceptedSet, Config, Estimate, FrictionPrior, Handling, Longitudinal, Nuisance, PerAxle, Range, Reading,
-    Recorded, RunKey, SignalCorrections, ValidWithin,
+    AcceptedSet, Config, DriveNext, Estimate, FrictionPrior, Handling, Longitudinal, Nuisance, PerAxle,
+    Range, Reading, Recorded, RunKey, SignalCorrections, ValidWithin,
 };
 
 /// What a set may be used for.
@@ -312,7 +312,7 @@ pub struct Outcome {
     /// What is wrong with the data.
     pub health: DataHealth,
     /// The driving that would help most.
-    pub drive_next: Vec<String>,
+    pub drive_next: Vec<DriveNext>,
     /// Which run this was.
     pub key: RunKey,
     /// The settings.

@@ -22,8 +22,9 @@ use crate::start::{check, initial_tires, no_softer};
 use crate::sweep::{Point, Sweep, sweep};
 use crate::tires::curve_change;
 use crate::{
-    AcceptedSet, Candidate, Config, FrictionPrior, IdentificationError, IterationRecord, Longitudinal,
-    Method, Monitor, Outcome, PerAxle, Reading, Recorded, ResidualModel, RunKey, Usable, longitudinal,
+    AcceptedSet, Candidate, Config, DriveNext, FrictionPrior, IdentificationError, IterationRecord,
+    Longitudinal, Manoeuvre, Method, Monitor, Outcome, PerAxle, Reading, Recorded, ResidualModel, RunKey,
+    Usable, longitudinal,
 };
 
 /// What a run wants next.
@@ -141,7 +142,7 @@ impl Identification {
         let mut initial = initial_tires(prior, previous, config.method, &config.initial);
         let health = DataHealth::of(sequence)?;
         let longitudinal = longitudinal(&usable.sequence, vehicle);
-        let refuse = |reasons: Vec<String>, drive: Option<&str>| {
+        let refuse = |reasons: Vec<String>, drive: Option<DriveNext>| {
             let request = Request {
                 key: &key,
                 vehicle,
@@ -151,7 +152,7 @@ impl Identification {
                 longitudinal: &longitudinal,
                 recorded: &usable.recorded,
             };
-            let drive_next = drive.map(str::to_owned).into_iter().collect();
+            let drive_next = drive.into_iter().collect();
             Started::Refused(Box::new(refused(&request, &health, reasons, drive_next)))
         };
         let objections = &usable.recorded.objections;
@@ -160,11 +161,11 @@ impl Identification {
         }
         if let Some(reason) = Excitation::of(&usable.sequence)?.insufficient {
             let drive = "drive corners both ways, at growing speed, for half a minute";
-            return Ok(refuse(vec![reason], Some(drive)));
+            return Ok(refuse(vec![reason], Some(Manoeuvre::CornersBothWays.because(drive))));
         }
         let mut data = match Data::new(usable, vehicle, &health, MIN_WINDOWS) {
             Err(error @ IdentificationError::TooLittle { drive, .. }) => {
-                return Ok(refuse(vec![error.to_string()], Some(drive)));
+                return Ok(refuse(vec![error.to_string()], Some(Manoeuvre::DriveOn.because(drive))));
             }
             other => other?,
         };

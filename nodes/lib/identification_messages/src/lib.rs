@@ -3,8 +3,8 @@
 mod longitudinal;
 
 use gripsight_identification::{
-    Candidate, Estimate, FrictionPrior, INPUTS, IdentificationError, LiveSample, Longitudinal, OUTPUTS,
-    Outcome, PeakFriction, Range, ResidualKind, ResidualModel, RunKey, SignalCorrections, Status,
+    Candidate, DriveNext, Estimate, FrictionPrior, INPUTS, IdentificationError, LiveSample, Longitudinal,
+    OUTPUTS, Outcome, PeakFriction, Range, ResidualKind, ResidualModel, RunKey, SignalCorrections, Status,
 };
 use gripsight_msgs as msg;
 use gripsight_vehicle::{
@@ -21,6 +21,18 @@ pub fn handshake(key: &RunKey) -> msg::Handshake {
         vehicle_hash: key.vehicle_hash.clone(),
         seed: key.seed,
     }
+}
+
+/// What to drive next as messages.
+#[must_use]
+pub fn drive_next(next: &[DriveNext]) -> Vec<msg::DriveNext> {
+    let message = |next: &DriveNext| msg::DriveNext {
+        manoeuvre: next.manoeuvre.name().to_owned(),
+        v_x_mps: next.v_x_mps.unwrap_or(f64::NAN),
+        a_y_mps2: next.a_y_mps2.unwrap_or(f64::NAN),
+        why: next.why.clone(),
+    };
+    next.iter().map(message).collect()
 }
 
 /// The inverse of [`handshake`].

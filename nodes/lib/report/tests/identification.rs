@@ -6,10 +6,10 @@
 use std::f64::consts::TAU;
 
 use gripsight_identification::{
-    Change, Config, Estimate, FrictionPrior, Given, Handling, HandlingPoint, HorizonError, IterationRecord,
-    LimitsAt, Longitudinal, Nuisance, Outcome, PeakFriction, PerAxle, ProvisionalSet, Range, Recorded, Rmse,
-    RmseReport, RunKey, SignalCorrections, SignalEstimates, Source, Status, TireCurve, Told, Trace,
-    ValidWithin, WeakSignal,
+    Change, Config, DriveNext, Estimate, FrictionPrior, Given, Handling, HandlingPoint, HorizonError,
+    IterationRecord, LimitsAt, Longitudinal, Manoeuvre, Nuisance, Outcome, PeakFriction, PerAxle,
+    ProvisionalSet, Range, Recorded, Rmse, RmseReport, RunKey, SignalCorrections, SignalEstimates, Source,
+    Status, TireCurve, Told, Trace, ValidWithin, WeakSignal,
 };
 use gripsight_report::{Header, IdentificationInput, identification_page};
 use gripsight_signals::DataHealth;
@@ -143,7 +143,12 @@ fn outcome() -> Outcome {
             moving_share: 0.97,
             recorded: vec!["x_m", "y_m", "yaw_rad"],
         },
-        drive_next: vec!["Drive a slalom of growing speed: the rear tires saw slip up to 8.6° only.".into()],
+        drive_next: vec![DriveNext {
+            manoeuvre: Manoeuvre::CornerHarder,
+            v_x_mps: None,
+            a_y_mps2: Some(9.1),
+            why: "Corner harder: the rear tires saw slip up to 8.6° only".into(),
+        }],
         key: RunKey {
             run_id: String::new(),
             sequence_id: 1,

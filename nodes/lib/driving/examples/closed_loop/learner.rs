@@ -142,6 +142,7 @@ impl Learner {
             self.watch = self.in_use.as_ref().map(|set| GripWatch::new(&self.vehicle, set)).transpose()?;
         }
         driver.take_longitudinal(told(&outcome.longitudinal));
+        driver.ask_for_turn_ins(outcome.drive_next.iter().any(|next| next.manoeuvre.is_turning_in()));
         if let Some(set) = &outcome.provisional {
             take(driver, &outcome, &set.phi_p, Trust::Provisional, verbose);
         }

@@ -32,6 +32,7 @@ use crate::state::{Asked, CarState, DriveCommand};
 use crate::steering::{Controller, Moment, Steering};
 use crate::tires::{TireSet, Trust};
 use crate::trial::{Memory, Model, Trial, trial};
+use crate::weave::weave_mps2;
 use crate::{Actuator, DrivingError, Longitudinal, Place, Track};
 
 /// Longest delay that is made up for.
@@ -63,6 +64,8 @@ pub struct Driver {
     caught_before: Option<Caught>,
     /// Until when a slide is no news: a model was given back.
     trusted_until_s: f64,
+    /// Whether identification wants turn-ins beside those of the line.
+    turn_ins: bool,
     /// As identified.
     actuator: Actuator,
     /// What a diagnosis names, as far as the last lap agreed.
@@ -112,6 +115,7 @@ impl Driver {
             caught: None,
             caught_before: None,
             trusted_until_s: f64::NEG_INFINITY,
+            turn_ins: true,
             plan,
             governor: Governor::default(),
             progress,
@@ -197,6 +201,12 @@ impl Driver {
     pub fn take_longitudinal(&mut self, told: Longitudinal) {
         self.drivetrain.told = told.beside(&self.drivetrain.told);
         self.renew();
+    }
+
+    /// Whether identification asks for turn-ins, which the line may not have. As long as nobody has measured the tires, and it is not said that something
+    /// else is wanted, the pursuit weaves within the track where the line leaves grip for it.
+    pub fn ask_for_turn_ins(&mut self, wanted: bool) {
+        self.turn_ins = wanted;
     }
 
     /// The set in use must not be used any more, or its grip has fallen. `share`: what the road gives of what the set promises, where it is known.
@@ -311,6 +321,11 @@ impl Driver {
             delay_s,
             lag_s,
             assumed: self.is_assumed(),
+            weave_mps2: if self.is_assumed() && self.turn_ins {
+                weave_mps2(state, place, &self.track, self.vehicle.wheelbase_m(), self.plan.grip)
+            } else {
+                0.0
+            },
             speed_gain_1ps: self.settings.speed_gain_1ps,
         };
         let predicted = self.predicting.as_mut().and_then(|controller| controller.angle_rad(&moment).ok());

@@ -45,6 +45,7 @@ pub fn identification_page(input: &IdentificationInput<'_>) -> Result<String, Re
         Status::Accepted | Status::AcceptedWithin => "Tires to use",
         Status::Provisional | Status::Rejected => "Tires found",
     };
+    let next: Vec<String> = outcome.drive_next.iter().map(ToString::to_string).collect();
     let drawn = !outcome.trace.time_s.is_empty();
     let body = html! {
         @if drawn {
@@ -62,7 +63,7 @@ pub fn identification_page(input: &IdentificationInput<'_>) -> Result<String, Re
 
         (section("Drive train", false, &tables::longitudinal(outcome)))
         (section("What limits the result", false, &list(&outcome.reasons, "Nothing that was found.")))
-        (section("Drive next", false, &list(&outcome.drive_next, "Nothing in particular.")))
+        (section("Drive next", false, &list(&next, "Nothing in particular.")))
         @if drawn {
             (section("Lateral velocity, worst seconds", false, &figure(&v_y, "")?))
             (section("Yaw rate, worst seconds", false, &figure(&yaw_rate, &worst)?))
