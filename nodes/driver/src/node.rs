@@ -151,10 +151,14 @@ impl Wheel {
         }
     }
 
-    /// What a run of the identification wants to be driven next.
+    /// What the identification wants to be driven next: while it waits for its first sequence, what tells the most.
     fn ask(&mut self, message: &IdentificationProgress, hash: &str) {
-        if message.stage == IdentificationProgress::FINISHED && message.handshake.vehicle_hash == hash {
-            self.driver.ask_for_turn_ins(asks_for_turn_ins(&message.drive_next));
+        match message.stage {
+            IdentificationProgress::WAITING => self.driver.ask_for_turn_ins(true),
+            IdentificationProgress::FINISHED if message.handshake.vehicle_hash == hash => {
+                self.driver.ask_for_turn_ins(asks_for_turn_ins(&message.drive_next));
+            }
+            _ => {}
         }
     }
 

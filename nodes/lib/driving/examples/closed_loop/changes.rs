@@ -11,7 +11,6 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use crate::drive::Loop;
-use crate::learner::Learner;
 use crate::run::{Case, Variant};
 use crate::store::{Store, mean, median, parts, quantile};
 use crate::{Arguments, plant};
@@ -154,7 +153,7 @@ fn drive(plan: &Plan, verbose: bool) -> Result<Vec<Row>> {
     };
     let mut run = Loop::new(case, start, verbose)?;
     if matches!(knows, Knows::Identified | Knows::Prior) {
-        run.learner = Some(Learner::new(run.vehicle.clone(), prior(case.mu, 0)));
+        run.learn(prior(case.mu, 0));
     }
     if verbose {
         eprintln!("{} {} seed {} {}", case.car.name, case.track, case.seed, knows.name());

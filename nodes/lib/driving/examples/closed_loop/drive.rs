@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result};
 use gripsight_driving::{CarState, Driver, Drivetrain, Limits, Settings, TireSet};
+use gripsight_identification::FrictionPrior;
 use gripsight_reference_car::{Command, Course, EffectSetting, SensorSample, Simulation};
 use gripsight_vehicle::VehicleParameters;
 
@@ -84,6 +85,12 @@ impl Loop {
             halves: 0,
             verbose,
         })
+    }
+
+    /// Identifies while it drives, and asks for what tells the most.
+    pub(crate) fn learn(&mut self, prior: Option<FrictionPrior>) {
+        self.learner = Some(Learner::new(self.vehicle.clone(), prior));
+        self.driver.ask_for_turn_ins(true);
     }
 
     /// The road changes, everywhere and at once; `set`: the plant's tires on it.

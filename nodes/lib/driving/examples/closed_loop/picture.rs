@@ -8,7 +8,6 @@ use gripsight_reference_car::CarParameters;
 use plotters::prelude::*;
 
 use crate::drive::Loop;
-use crate::learner::Learner;
 use crate::run::{Case, Variant};
 use crate::{Arguments, plant};
 
@@ -48,7 +47,7 @@ pub(crate) fn experiment(arguments: &Arguments) -> Result<String> {
         controller: arguments.controller,
     };
     let mut run = Loop::new(&case, TireSet::start(), arguments.verbose)?;
-    run.learner = Some(Learner::new(run.vehicle.clone(), Variant::NoPrior.prior(mu, case.seed)));
+    run.learn(Variant::NoPrior.prior(mu, case.seed));
     let grip = tires.grip();
     let length_m = run.driver.track().length_m();
     let longest_s = 4.0 * LAPS as f64 * run.referee.fastest_lap_s();

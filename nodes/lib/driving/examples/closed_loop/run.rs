@@ -8,7 +8,6 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::drive::Loop;
-use crate::learner::Learner;
 use crate::plant;
 use crate::referee::Lap;
 
@@ -95,7 +94,7 @@ pub(crate) fn drive(case: &Case, variant: Variant, verbose: bool) -> Result<Run>
         run.driver.take_longitudinal(plant::told(&case.car, case.mu));
     }
     if !matches!(variant, Variant::None | Variant::True) {
-        run.learner = Some(Learner::new(run.vehicle.clone(), variant.prior(case.mu, case.seed)));
+        run.learn(variant.prior(case.mu, case.seed));
     }
     let longest_s = 4.0 * case.laps as f64 * run.referee.fastest_lap_s();
     let mut wreck = None;

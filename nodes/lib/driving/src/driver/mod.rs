@@ -115,7 +115,7 @@ impl Driver {
             caught: None,
             caught_before: None,
             trusted_until_s: f64::NEG_INFINITY,
-            turn_ins: true,
+            turn_ins: false,
             plan,
             governor: Governor::default(),
             progress,
@@ -203,8 +203,8 @@ impl Driver {
         self.renew();
     }
 
-    /// Whether identification asks for turn-ins, which the line may not have. As long as nobody has measured the tires, and it is not said that something
-    /// else is wanted, the pursuit weaves within the track where the line leaves grip for it.
+    /// Whether identification asks for turn-ins, which the line may not have: the pursuit then weaves within the track, as long as nobody has measured the
+    /// tires and where the line leaves grip for it.
     pub fn ask_for_turn_ins(&mut self, wanted: bool) {
         self.turn_ins = wanted;
     }

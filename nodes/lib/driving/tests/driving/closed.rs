@@ -363,8 +363,36 @@ fn a_warning_slows_at_once_and_a_known_peak_ends_it() {
 }
 
 #[test]
+fn who_is_asked_for_turn_ins_weaves_until_the_tires_are_known() {
+    // Turns of the steering from one side to the other over 5 s at one place of the line.
+    let sways = |driver: &mut Driver| {
+        let angle = |k: i32| {
+            let stamp_s = 0.02 * f64::from(k);
+            let car = on_the_line(driver, 0.0, 3.0);
+            let yaw_rate_radps = car.v_x_mps * driver.track().at(0.0).curvature_1pm;
+            let car = CarState { stamp_s, yaw_rate_radps, ..car };
+            driver.command(&car, stamp_s).steering_rad
+        };
+        let angles: Vec<f64> = (0..250).map(angle).collect();
+        let [low, high] = [f64::min, f64::max].map(|of| angles.iter().copied().reduce(of).unwrap());
+        high - low
+    };
+    let mut driver = driver(TireSet::start());
+    let still = sways(&mut driver);
+    driver.ask_for_turn_ins(true);
+    let weaves = sways(&mut driver);
+    assert!(weaves > 0.02 && weaves > 4.0 * still, "{still} rad, asked {weaves} rad");
+    driver.ask_for_turn_ins(false);
+    assert!(sways(&mut driver) < 2.0 * still + 1e-3);
+    driver.ask_for_turn_ins(true);
+    driver.take(set(0.6, Trust::AcceptedWithin)).unwrap();
+    assert!(sways(&mut driver) < 2.0 * still + 1e-3);
+}
+
+#[test]
 fn a_car_that_starts_does_not_steer_by_its_noise() {
     let mut driver = driver(TireSet::start());
+    driver.ask_for_turn_ins(true);
     let mut asked = Vec::new();
     for k in 0..100 {
         let stamp_s = 0.01 * f64::from(k);
