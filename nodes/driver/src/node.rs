@@ -42,6 +42,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
         start_ns: None,
         seen: None,
         last: DriveCommand::default(),
+        turn_ins: false,
         fallen: None,
         driver,
         settings,
@@ -79,6 +80,8 @@ struct Wheel {
     /// When odometry came last.
     seen: Option<Instant>,
     last: DriveCommand,
+    /// Whether the identification asks for turn-ins.
+    turn_ins: bool,
     /// What the last grip said: the sequence of the set, and the share left of what it promises.
     fallen: Option<(u64, f64)>,
 }
@@ -153,12 +156,18 @@ impl Wheel {
 
     /// What the identification wants to be driven next: while it waits for its first sequence, what tells the most.
     fn ask(&mut self, message: &IdentificationProgress, hash: &str) {
-        match message.stage {
-            IdentificationProgress::WAITING => self.driver.ask_for_turn_ins(true),
+        let wanted = match message.stage {
+            IdentificationProgress::WAITING => true,
             IdentificationProgress::FINISHED if message.handshake.vehicle_hash == hash => {
-                self.driver.ask_for_turn_ins(asks_for_turn_ins(&message.drive_next));
+                asks_for_turn_ins(&message.drive_next)
             }
-            _ => {}
+            _ => return,
+        };
+        self.driver.ask_for_turn_ins(wanted);
+        if wanted != self.turn_ins {
+            let says = if wanted { "asks for turn-ins" } else { "asks for turn-ins no more" };
+            tracing::info!("the identification {says}");
+            self.turn_ins = wanted;
         }
     }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use gripsight_identification::vehicle_hash;
-use gripsight_msgs::PacejkaParams;
+use gripsight_msgs::{IdentificationProgress, Message, PacejkaParams};
 use gripsight_tests::domain::Domain;
 use gripsight_tests::peers::{PATIENCE, available, cyclone, start_cyclone};
 use gripsight_tests::process::{Process, node};
@@ -40,6 +40,16 @@ fn warn(domain: &Domain, python: &Path, hash: &str, sequence: u64) {
     let kind = "gripsight_msgs/msg/Grip";
     let mut peer = start_cyclone(domain, python, &["publish", "/identifier/grip", kind, "--qos", "latched"]);
     peer.feed(&grip.to_string());
+    assert!(peer.wait(PATIENCE).success());
+}
+
+/// Says where the identification stands, and what it wants to be driven next.
+fn ask(domain: &Domain, python: &Path, hash: &str, stage: u8, manoeuvre: &str) {
+    let next = json!({"manoeuvre": manoeuvre, "v_x_mps": 5.0, "a_y_mps2": 2.0, "why": "as a peer says"});
+    let said = json!({"handshake": {"vehicle_hash": hash}, "stage": stage, "drive_next": [next]});
+    let arguments = ["publish", "/identifier/progress", IdentificationProgress::TYPE, "--qos", "latched"];
+    let mut peer = start_cyclone(domain, python, &arguments);
+    peer.feed(&said.to_string());
     assert!(peer.wait(PATIENCE).success());
 }
 
@@ -84,16 +94,25 @@ fn the_driver_laps_the_live_car_takes_a_set_and_slows_when_it_is_withdrawn() {
             "-r",
             "grip:=identifier/grip",
             "-r",
+            "progress:=identifier/progress",
+            "-r",
             "extended_model:=gap_diagnosis/extended_model",
         ],
     );
+    let text = std::fs::read_to_string(&vehicle).unwrap();
+    let hash = vehicle_hash(&VehicleParameters::from_ros_yaml(&text).unwrap());
+    // It waits for its first sequence; then it was refused.
+    ask(&domain, &python, "", IdentificationProgress::WAITING, "");
+    driver.wait_for_log("the identification asks for turn-ins", PATIENCE);
     // The car stands until the first command reaches it: that lap shows nothing.
     lap(&driver);
     let slow = lap(&driver);
     assert_eq!(slow.exits, 0, "off the track on the start's tires");
+    ask(&domain, &python, &hash, IdentificationProgress::FINISHED, "corner_harder");
+    driver.wait_for_log("the identification asks for turn-ins no more", PATIENCE);
+    ask(&domain, &python, &hash, IdentificationProgress::FINISHED, "turn_ins");
+    driver.wait_for_log("the identification asks for turn-ins", PATIENCE);
 
-    let text = std::fs::read_to_string(&vehicle).unwrap();
-    let hash = vehicle_hash(&VehicleParameters::from_ros_yaml(&text).unwrap());
     publish(&domain, &python, "of another car", PacejkaParams::ACCEPTED);
     driver.wait_for_log("of a car with other parameters", PATIENCE);
     publish(&domain, &python, &hash, PacejkaParams::ACCEPTED);
