@@ -192,8 +192,8 @@ impl Around<'_, '_> {
         best.at.cost.is_finite().then_some(Refined { values: target, starts: best.starts })
     }
 
-    /// Logarithm of a configuration's evidence by rollouts near the linearisation, its prior weight counted, for a look: by steps whose derivatives stay those of the linearisation (chord steps), so that each costs
-    /// one plain rollout.
+    /// A configuration fitted near the linearisation, for a look, with the logarithm of its evidence by rollouts, its prior weight counted: by steps whose
+    /// derivatives stay those of the linearisation (chord steps), so that each costs one plain rollout.
     pub(crate) fn nearby(&self, problem: &Quadratic, chosen: &[usize]) -> Option<(f64, Refined)> {
         let Configuration { step, log_occam, .. } =
             configuration(problem, self.dispersion, self.terms, chosen)?;
