@@ -39,7 +39,10 @@ pub struct Change {
     pub site: &'static str,
     /// Canonical name of the effect; `tires`; or `other` for what no effect of the library does.
     pub name: &'static str,
-    /// The later drive less the earlier one, of the first parameter, with its 90 % interval; unknown (`null`) of tires and `other`.
+    /// What of the effect differs: what is reported of it, or of its parameters the one that stands out most; none of tires and `other`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub parameter: Option<&'static str>,
+    /// The later drive less the earlier one, with its 90 % interval; unknown (`null`) of tires and `other`.
     pub difference: EffectParameter,
     /// Probability that it has changed.
     pub probability: f64,

@@ -172,7 +172,7 @@ fn differences(engine: &Engine<'_>, earlier: &Inferred, between: &Between) -> Ve
         let weight = decisions::PRIOR / range.len() as f64;
         // What the library lacks at a site depends on the ground: over another one it is as large, and another; two of
         // that size differ by sqrt 2 times it.
-        let lacking = range.clone().map(|c| earlier.values[c].abs()).fold(0.0, f64::max);
+        let lacking = range.clone().map(|c| earlier.sizes.values[c].abs()).fold(0.0, f64::max);
         let apart = lacking * (2.0 * between.of_one).sqrt();
         let prior = |column: usize| {
             let same = apart.hypot(SAME_FLEXIBLE * decisions::usual_flexible(site, column - range.start));
@@ -201,9 +201,15 @@ impl Compared {
     /// Probability that an effect differs: that of the fit, and no more than the chance that such a size is a cause.
     pub(crate) fn of_effect(&self, earlier: &Inferred, effect: EffectId) -> f64 {
         let Some(term) = earlier.term_of(effect).filter(|_| earlier.is_open(effect)) else { return 0.0 };
-        let told = |(mean, sigma): (Vec<f64>, Vec<f64>)| mean[0].abs() / (NINETY * sigma[0]);
-        let told = self.difference(earlier, effect).map_or(0.0, told);
+        let told = self.standing_out(earlier, effect).map_or(0.0, |(_, told)| told);
         self.probability(term).min(decisions::chance(told))
+    }
+
+    /// Of an effect's parameters that size it the one whose difference stands out most, and by how many half widths of its 90 % interval it differs.
+    pub(crate) fn standing_out(&self, earlier: &Inferred, effect: EffectId) -> Option<(usize, f64)> {
+        let (mean, sigma) = self.difference(earlier, effect)?;
+        let told = mean.iter().zip(&sigma).map(|(d, s)| d.abs() / (NINETY * s));
+        told.take(effect.sizing()).enumerate().max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// Probability that the tires differ.
@@ -233,6 +239,29 @@ impl Compared {
         Some((self.selection.mean[place][wide].clone(), self.selection.sigma[place][wide].clone()))
     }
 
+    /// The difference of an effect as it is stated: of what is reported of it, else of the parameter that stands out most.
+    fn stated(&self, earlier: &Inferred, effect: EffectId) -> Option<(&'static str, EffectParameter)> {
+        let (spec, before) = (effect.spec(), self.earlier(earlier, effect)?);
+        let (difference, sigma) = self.difference(earlier, effect)?;
+        let (most, _) = self.standing_out(earlier, effect)?;
+        let parameter = &spec.parameters[most];
+        let Some(reported) = spec.reported.first() else {
+            let (value, half) = (difference[most], NINETY * sigma[most]);
+            let (low, high) = (value - half, value + half);
+            let before = Some(before[most]);
+            return Some((
+                parameter.name,
+                EffectParameter { value, low, high, unit: parameter.unit, before },
+            ));
+        };
+        let own = (reported.value)(&before);
+        let after: Vec<f64> = before.iter().zip(&difference).map(|(b, d)| b + d).collect();
+        let (value, low, high) =
+            reported.with_ends(&after, &sigma.iter().map(|s| NINETY * s).collect::<Vec<_>>());
+        let (value, low, high) = (value - own, low - own, high - own);
+        Some((reported.name, EffectParameter { value, low, high, unit: reported.unit, before: Some(own) }))
+    }
+
     /// All that is worth a word, the likeliest first.
     pub(crate) fn changes(&self, earlier: &Inferred) -> Vec<Change> {
         let nothing =
@@ -240,30 +269,29 @@ impl Compared {
         let mut out = vec![Change {
             site: Site::FrontAxle.name(),
             name: "tires",
+            parameter: None,
             difference: nothing("1"),
             probability: self.of_tires(),
         }];
         for &effect in &earlier.columns.effects {
-            let Some((mean, sigma)) = self.difference(earlier, effect) else { continue };
-            let (mean, half) = (mean[0], NINETY * sigma[0]);
-            let before = self.earlier(earlier, effect).and_then(|own| own.first().copied());
-            let spec = effect.spec();
+            let Some((parameter, difference)) = self.stated(earlier, effect) else { continue };
             out.push(Change {
-                site: spec.sites.first().map_or("", |s| s.name()),
+                site: effect.spec().sites.first().map_or("", |s| s.name()),
                 name: effect.name(),
-                difference: EffectParameter {
-                    value: mean,
-                    low: mean - half,
-                    high: mean + half,
-                    unit: spec.parameters[0].unit,
-                    before,
-                },
+                parameter: Some(parameter),
+                difference,
                 probability: self.of_effect(earlier, effect),
             });
         }
         for site in Site::ALL {
             let probability = self.of_site(earlier, site);
-            out.push(Change { site: site.name(), name: "other", difference: nothing("1"), probability });
+            out.push(Change {
+                site: site.name(),
+                name: "other",
+                parameter: None,
+                difference: nothing("1"),
+                probability,
+            });
         }
         out.retain(|c| c.probability >= decisions::LISTED);
         out.sort_by(|a, b| b.probability.total_cmp(&a.probability));

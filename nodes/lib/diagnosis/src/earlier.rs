@@ -127,12 +127,13 @@ impl Earlier {
         let engine = Engine::new(&self.recording, later.vehicle, self.inferred.tires, TireTrust::drive());
         let compared = compare(&engine, &self.inferred, inferred)?;
         let changes = compared.changes(&self.inferred);
+        let stands_out =
+            |e: &EffectId| compared.standing_out(&self.inferred, *e).is_some_and(|(_, told)| told > 1.0);
         let mut accepted: Vec<EffectId> = changes
             .iter()
-            .filter(|c| {
-                c.probability >= decisions::LIKELY && !(c.difference.low <= 0.0 && c.difference.high >= 0.0)
-            })
+            .filter(|c| c.probability >= decisions::LIKELY)
             .filter_map(|c| EffectId::by_name(c.name))
+            .filter(stands_out)
             .collect();
         accepted.dedup();
         Some(Differences { compared, changes, accepted })

@@ -218,17 +218,7 @@ pub(crate) fn reported(
     spec.reported
         .iter()
         .map(|r| {
-            let value = (r.value)(own);
-            // Ends from moving each fitted parameter by its own interval.
-            let (mut low, mut high) = (value, value);
-            for i in 0..own.len() {
-                for sign in [-1.0, 1.0] {
-                    let mut moved = own.clone();
-                    moved[i] += sign * if halves[i].is_finite() { halves[i] } else { 0.0 };
-                    let v = (r.value)(&moved);
-                    (low, high) = (low.min(v), high.max(v));
-                }
-            }
+            let (value, low, high) = r.with_ends(own, &halves);
             (r.name, EffectParameter { value, low, high, unit: r.unit, before: given.map(r.value) })
         })
         .collect()

@@ -71,6 +71,7 @@ fn diagnosis() -> Diagnosis {
         changes: vec![Change {
             site: "steering",
             name: "other",
+            parameter: None,
             difference: EffectParameter {
                 value: f64::NAN,
                 low: f64::NAN,

@@ -199,9 +199,12 @@ impl Answer {
     }
 }
 
-/// A change of the first parameter beside the true one.
+/// A change of the parameter that sizes an effect beside the true one; none where another one is said to have changed.
 fn difference(truth: &SealedEffect, change: &SaidChange) -> Option<SizeCheck> {
     let (parameter, mechanism) = sizing_parameter(truth)?;
+    if change.parameter.as_ref().is_some_and(|said| said != parameter) {
+        return None;
+    }
     let null = if parameter == "ratio" { 1.0 } else { 0.0 };
     let size = truth.library_parameters.get(parameter)? - null;
     let (low, high) = change.difference.low.zip(change.difference.high)?;

@@ -37,6 +37,9 @@ pub struct SaidChange {
     pub site: String,
     /// Canonical name of the effect; `tires`; `other`.
     pub name: String,
+    /// Which parameter of the effect.
+    #[serde(default)]
+    pub parameter: Option<String>,
     /// By how much.
     pub difference: SaidParameter,
     /// Chance that it has changed.

@@ -84,6 +84,7 @@ fn a_comparison_is_judged_by_what_has_changed() {
     let change = |value: f64| SaidChange {
         site: "yaw_rate".to_owned(),
         name: "gyro_bias".to_owned(),
+        parameter: Some("bias_radps".to_owned()),
         difference: SaidParameter { value: Some(value), low: Some(value - 0.01), high: Some(value + 0.01) },
         probability: Some(0.9),
     };

@@ -74,6 +74,24 @@ pub struct Reported {
     pub value: fn(&[f64]) -> f64,
 }
 
+impl Reported {
+    /// Value with the ends of its interval: from moving each fitted parameter by its own half width, where that is known.
+    #[must_use]
+    pub fn with_ends(&self, fitted: &[f64], half_widths: &[f64]) -> (f64, f64, f64) {
+        let value = (self.value)(fitted);
+        let (mut low, mut high) = (value, value);
+        for (i, half) in half_widths.iter().enumerate().filter(|(_, half)| half.is_finite()) {
+            for end in [-half, *half] {
+                let mut moved = fitted.to_vec();
+                moved[i] += end;
+                let v = (self.value)(&moved);
+                (low, high) = (low.min(v), high.max(v));
+            }
+        }
+        (value, low, high)
+    }
+}
+
 /// How much of its first parameter a car may well have without anything being the matter: from the car, and from a size that matters.
 pub type Usual = fn(&VehicleParameters, f64) -> f64;
 

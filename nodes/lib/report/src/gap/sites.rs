@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use gripsight_diagnosis::{Change, Diagnosis, EffectParameter, SiteAnswer};
+use gripsight_model::EffectId;
 use maud::{Markup, html};
 
 use super::words::{unit, words};
@@ -130,7 +131,11 @@ fn differing(change: &Change, verb: &str) -> String {
     let what = if change.name == "other" {
         format!("something with {} that the library lacks", place(change.site))
     } else {
-        words(change.name)
+        // Which of several parameters, where the effect has more than one.
+        let of_several = EffectId::by_name(change.name).is_some_and(|e| e.sizing() > 1);
+        let parameter =
+            change.parameter.filter(|_| of_several).map_or(String::new(), |p| format!(" ({})", words(p)));
+        words(change.name) + &parameter
     };
     let d = &change.difference;
     let size = if d.value.is_finite() {
