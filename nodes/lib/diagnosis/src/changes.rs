@@ -19,8 +19,10 @@ use crate::engine::Engine;
 
 use crate::answer::Change;
 use crate::between::Between;
+use crate::infer::FIRST;
 use crate::inferred::Inferred;
 use crate::outcome::EffectParameter;
+use crate::sizes::{Sized, half_widths_of_difference};
 use crate::trust::TireTrust;
 
 /// Share of a size that matters by which an effect may differ between two drives of a car that nobody has touched.
@@ -31,13 +33,12 @@ const SAME_FLEXIBLE: f64 = 0.5;
 const OTHER_TIRES: f64 = 10.0;
 /// Share of a dispersion above which it is the same.
 const SETTLED: f64 = 0.95;
-/// Half width of a 90 % interval in standard deviations.
-pub(crate) const NINETY: f64 = 1.645;
-
 /// The differences of two drives.
 #[derive(Debug, Clone)]
 pub(crate) struct Compared {
     selection: Selection,
+    /// What each effect of the columns differs by, where it differs, with the half widths of 90 % intervals.
+    by: Vec<Sized>,
     /// How many times larger than they may be the contradictions are that no change explains.
     pub(crate) dispersion: f64,
     terms: usize,
@@ -94,7 +95,18 @@ pub(crate) fn compare(engine: &Engine<'_>, earlier: &Inferred, later: &Inferred)
             selection.best.iter().zip(&terms).map(|(a, t)| (*a).min(t.log_weights.len() - 1)).collect();
         selection = select(&problem, dispersion, &terms, &start, 23)?;
     }
-    Some(Compared { selection, dispersion, terms: earlier.terms.len() })
+    let of = |(i, &effect): (usize, &EffectId)| {
+        let sized = wide(&selection, earlier.terms.len() + FIRST + i);
+        (sized.0.clone(), half_widths_of_difference(engine, effect, &sized))
+    };
+    let by = earlier.columns.effects.iter().enumerate().map(of).collect();
+    Some(Compared { selection, by, dispersion, terms: earlier.terms.len() })
+}
+
+/// A term's step with standard deviations where it is wide open.
+fn wide(selection: &Selection, term: usize) -> Sized {
+    let wide = selection.mean[term].len() - 1;
+    (selection.mean[term][wide].clone(), selection.sigma[term][wide].clone())
 }
 
 /// The free terms of a site's difference that close too little of the later drive's error, those that close least first.
@@ -207,8 +219,8 @@ impl Compared {
 
     /// Of an effect's parameters that size it the one whose difference stands out most, and by how many half widths of its 90 % interval it differs.
     pub(crate) fn standing_out(&self, earlier: &Inferred, effect: EffectId) -> Option<(usize, f64)> {
-        let (mean, sigma) = self.difference(earlier, effect)?;
-        let told = mean.iter().zip(&sigma).map(|(d, s)| d.abs() / (NINETY * s));
+        let (by, half_widths) = self.by.get(earlier.term_of(effect)? - FIRST)?;
+        let told = by.iter().zip(half_widths).map(|(d, half)| d.abs() / half);
         told.take(effect.sizing()).enumerate().max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
@@ -233,20 +245,18 @@ impl Compared {
     }
 
     /// Differences of an effect's parameters, where it differs, and their standard deviations.
-    pub(crate) fn difference(&self, earlier: &Inferred, effect: EffectId) -> Option<(Vec<f64>, Vec<f64>)> {
-        let place = self.terms + earlier.term_of(effect)?;
-        let wide = self.selection.mean[place].len() - 1;
-        Some((self.selection.mean[place][wide].clone(), self.selection.sigma[place][wide].clone()))
+    pub(crate) fn difference(&self, earlier: &Inferred, effect: EffectId) -> Option<Sized> {
+        Some(wide(&self.selection, self.terms + earlier.term_of(effect)?))
     }
 
     /// The difference of an effect as it is stated: of what is reported of it, else of the parameter that stands out most.
     fn stated(&self, earlier: &Inferred, effect: EffectId) -> Option<(&'static str, EffectParameter)> {
         let (spec, before) = (effect.spec(), self.earlier(earlier, effect)?);
-        let (difference, sigma) = self.difference(earlier, effect)?;
+        let (difference, half_widths) = self.by.get(earlier.term_of(effect)? - FIRST)?;
         let (most, _) = self.standing_out(earlier, effect)?;
         let parameter = &spec.parameters[most];
         let Some(reported) = spec.reported.first() else {
-            let (value, half) = (difference[most], NINETY * sigma[most]);
+            let (value, half) = (difference[most], half_widths[most]);
             let (low, high) = (value - half, value + half);
             let before = Some(before[most]);
             return Some((
@@ -255,9 +265,8 @@ impl Compared {
             ));
         };
         let own = (reported.value)(&before);
-        let after: Vec<f64> = before.iter().zip(&difference).map(|(b, d)| b + d).collect();
-        let (value, low, high) =
-            reported.with_ends(&after, &sigma.iter().map(|s| NINETY * s).collect::<Vec<_>>());
+        let after: Vec<f64> = before.iter().zip(difference).map(|(b, d)| b + d).collect();
+        let (value, low, high) = reported.with_ends(&after, half_widths);
         let (value, low, high) = (value - own, low - own, high - own);
         Some((reported.name, EffectParameter { value, low, high, unit: reported.unit, before: Some(own) }))
     }

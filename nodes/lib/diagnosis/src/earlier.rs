@@ -8,14 +8,14 @@ use gripsight_vehicle::VehicleParameters;
 
 use crate::answer::Change;
 use crate::budget::{Budget, Scorer, large_slip_rad};
-use crate::changes::{Compared, NINETY, compare};
+use crate::changes::{Compared, compare};
 use crate::decisions;
 use crate::diagnose::{SEARCH_WINDOWS, explain, fitted_null};
 use crate::engine::Engine;
 use crate::infer::{infer, linearised};
 use crate::inferred::Inferred;
 use crate::outcome::{Diagnosis, RankedEffect};
-use crate::sizes::{Sized, reported};
+use crate::sizes::{NINETY, Sized, reported};
 use crate::trust::TireTrust;
 use crate::usable::usable;
 use crate::{GapError, Request, Verdict};

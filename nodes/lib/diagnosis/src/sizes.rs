@@ -185,6 +185,16 @@ fn half_widths(engine: &Engine<'_>, effect: EffectId, (own, sigma): &Sized) -> V
     own.iter().zip(sigma).zip(spec.parameters).map(half).collect()
 }
 
+/// Half widths of the 90 % intervals of what an effect's parameters differ by between two drives: as of an effect of that size.
+pub(crate) fn half_widths_of_difference(
+    engine: &Engine<'_>,
+    effect: EffectId,
+    (by, sigma): &Sized,
+) -> Vec<f64> {
+    let size = by.iter().zip(effect.spec().parameters).map(|(by, p)| p.null + by);
+    half_widths(engine, effect, &(size.collect(), sigma.clone()))
+}
+
 /// How many half widths of its interval an effect's size is away from what it is where it is absent: of the parameters that size it the largest.
 pub(crate) fn told(engine: &Engine<'_>, effect: EffectId, sized: &Sized) -> f64 {
     let absent = engine.absent(effect);
