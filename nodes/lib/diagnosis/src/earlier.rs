@@ -15,7 +15,7 @@ use crate::engine::Engine;
 use crate::infer::{infer, linearised};
 use crate::inferred::Inferred;
 use crate::outcome::{Diagnosis, RankedEffect};
-use crate::sizes::{NINETY, Sized, reported};
+use crate::sizes::{Sized, reported};
 use crate::trust::TireTrust;
 use crate::usable::usable;
 use crate::{GapError, Request, Verdict};
@@ -86,17 +86,16 @@ impl Earlier {
             .into_iter()
             .flatten()
             .min_by(|a, b| contradiction(a).total_cmp(&contradiction(b)));
-        // But where the later drive needs terms that the earlier one's model lacks, by more than the drives contradict each other anyway, it is far from anything that
-        // tells what has changed, and is linearised around a model of its own: if the drives then contradict each other no more than by chance.
+        // But where the later drive needs terms that the earlier one's model lacks it is far from anything that tells what has changed, and is linearised around
+        // a model of its own: where that is likelier, by what either place leaves of the later drive and what the drives contradict each other by.
         let own = own.map(|own| like.model_of(&own)).and_then(|(values, chosen)| {
             let own = at((&values, &chosen), true)?;
-            let needs = alike.as_ref().is_none_or(|alike| {
+            let likelier = alike.as_ref().is_none_or(|alike| {
                 let gained = (alike.0.weighed.cost - own.0.weighed.cost) / own.0.dispersion;
-                let by_chance = 1.0 + NINETY * (2.0 / values.len() as f64).sqrt();
-                gained > contradiction(alike) * price(&own.0.terms, &like.chosen, &chosen)
-                    && contradiction(&own) < contradiction(alike) * by_chance
+                let contradicts = (contradiction(&own) / contradiction(alike)).ln() * values.len() as f64;
+                gained > contradiction(alike) * (price(&own.0.terms, &like.chosen, &chosen) + contradicts)
             });
-            needs.then_some(own)
+            likelier.then_some(own)
         });
         own.or(alike).ok_or(GapError::NotFinite)
     }

@@ -241,7 +241,10 @@ fn every_verdict_has_its_sentence() {
     );
     for (verdict, words) in [
         (Verdict::TireRetuneOnly, "Other tires are all that helps"),
-        (Verdict::NoGap, "No gap"),
+        (
+            Verdict::NoGap,
+            "No effect of the library is at work as far as these data tell, but 3.1 times the noise remains",
+        ),
         (Verdict::NoneOfThese, "no effect of the library explains"),
         (Verdict::NotIdentifiable, "These data cannot tell: the named"),
     ] {
@@ -249,6 +252,19 @@ fn every_verdict_has_its_sentence() {
         let text = headline(&d);
         assert!(text.contains(words), "{text}");
     }
+}
+
+#[test]
+fn no_gap_is_said_only_where_little_is_left() {
+    let mut d = Diagnosis { verdict: Verdict::NoGap, ..diagnosis() };
+    (d.effects[0].confidence, d.effects[1].confidence) = (0.2, 0.34);
+    let text = headline(&d);
+    assert!(text.contains("; likeliest is tire relaxation") && text.contains("34 %"), "{text}");
+    (d.gap.retuned, d.gap.after) = (estimate(1.2, 0.1), estimate(1.2, 0.1));
+    d.gap.unstructured_ceiling = estimate(1.1, 0.1);
+    assert!(headline(&d).contains("No gap: model and car agree"), "{}", headline(&d));
+    let html = page_since(&d, Some(Before::Drive("monday.mcap")));
+    assert!(html.contains("Nothing has changed since monday.mcap but for noise"), "{html}");
 }
 
 #[test]
@@ -268,7 +284,7 @@ fn a_comparison_speaks_of_what_has_changed() {
     for (verdict, words) in [
         (Verdict::Effects, "What has changed since monday.mcap is steering delay"),
         (Verdict::TireRetuneOnly, "The tires have changed since monday.mcap"),
-        (Verdict::NoGap, "Nothing has changed since monday.mcap"),
+        (Verdict::NoGap, "No effect has changed since monday.mcap as far as these data tell, but 3.1 times"),
         (Verdict::NoneOfThese, "Something has changed since monday.mcap"),
     ] {
         d.verdict = verdict;
@@ -333,7 +349,7 @@ fn a_simulator_s_drive_is_the_other_end_of_a_change_that_leads_to_the_car() {
     for (verdict, words) in [
         (Verdict::Effects, "What differs from the simulator (sim.mcap) to the car is steering delay"),
         (Verdict::TireRetuneOnly, "The tires differ from the simulator (sim.mcap) to the car"),
-        (Verdict::NoGap, "Nothing differs from the simulator (sim.mcap) to the car but for noise"),
+        (Verdict::NoGap, "No effect differs from the simulator (sim.mcap) to the car as far as"),
         (Verdict::NoneOfThese, "Something differs from the simulator (sim.mcap) to the car that no effect"),
     ] {
         d.verdict = verdict;

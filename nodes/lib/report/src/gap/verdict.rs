@@ -4,7 +4,7 @@ use gripsight_diagnosis::{Diagnosis, RankedEffect, Verdict};
 
 use super::words::{closes, named, words};
 use crate::page::Tone;
-use crate::text::significant;
+use crate::text::{percent, significant};
 
 /// Below this share of the gap the effects named close only a part of it.
 const MOST: f64 = 0.5;
@@ -79,17 +79,17 @@ pub(super) fn sentence(d: &Diagnosis, before: Option<Before<'_>>) -> String {
             (Some(have), false) => format!("The tires {have}; {times} remains."),
             (None, false) => format!("Other tires are all that helps; {times} remains."),
         },
-        Verdict::NoGap => {
-            let rest = if remains { format!(" ({times})") } else { String::new() };
-            match &has {
-                Some(has) => {
-                    format!("Nothing {has} but for noise and the model's usual imperfection{rest}.")
-                }
-                None => format!(
-                    "No gap: model and car agree within the noise and the model's usual imperfection{rest}."
-                ),
-            }
+        Verdict::NoGap if !tires_suffice(d) => {
+            let what = match &has {
+                Some(has) => format!("No effect {has}"),
+                None => "No effect of the library is at work".to_owned(),
+            };
+            format!("{what} as far as these data tell, but {times} remains{}.", likeliest(d))
         }
+        Verdict::NoGap => match &has {
+            Some(has) => format!("Nothing {has} but for noise and the model's usual imperfection."),
+            None => "No gap: model and car agree within the noise and the model's usual imperfection.".into(),
+        },
         Verdict::NoneOfThese => match &has {
             Some(has) => format!(
                 "Something {has} that no effect of the library explains: with other tires {times} remains."
@@ -112,6 +112,13 @@ fn or_else(d: &Diagnosis, effect: &RankedEffect) -> String {
     std::iter::once(named(effect)).chain(others.map(|name| words(name))).collect::<Vec<_>>().join(" or ")
 }
 
+/// The likeliest of the effects that are not named, where it is worth a word.
+fn likeliest(d: &Diagnosis) -> String {
+    let candidates = d.effects.iter().filter(|e| e.confidence >= WORTH_A_WORD);
+    let first = candidates.max_by(|a, b| a.confidence.total_cmp(&b.confidence));
+    first.map_or_else(String::new, |e| format!("; likeliest is {} ({})", named(e), percent(e.confidence)))
+}
+
 /// What the effects named close together.
 fn closed(d: &Diagnosis) -> String {
     let closed = &d.gap_closed_fraction;
@@ -128,8 +135,7 @@ fn closed(d: &Diagnosis) -> String {
 pub(super) fn tone(d: &Diagnosis) -> Tone {
     let open = match d.verdict {
         Verdict::Effects => is_partial(d),
-        Verdict::TireRetuneOnly => !tires_suffice(d),
-        Verdict::NoGap => false,
+        Verdict::TireRetuneOnly | Verdict::NoGap => !tires_suffice(d),
         Verdict::NoneOfThese | Verdict::NotIdentifiable => true,
     };
     if open { Tone::Caution } else { Tone::Good }
