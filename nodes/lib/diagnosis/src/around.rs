@@ -115,8 +115,13 @@ impl Around<'_, '_> {
         let step = linear(chosen)?;
         let near = near.and_then(|(other, fitted)| {
             let (apart, has) = (&step - linear(other)?, self.in_use(other));
-            let at = |c: usize| {
-                if has[c] { fitted.values[c] + apart[c] } else { self.values[c] + step[c] }
+            // Of an effect that is absent here the linearisation tells the size alone: what shapes it stays.
+            let shapes = |e: &EffectId| self.columns.of_effect(*e).map(|r| r.start + e.sizing()..r.end);
+            let shaping: Vec<usize> = self.columns.effects.iter().filter_map(shapes).flatten().collect();
+            let at = |c: usize| match (has[c], shaping.contains(&c)) {
+                (true, _) => fitted.values[c] + apart[c],
+                (false, true) => self.values[c],
+                (false, false) => self.values[c] + step[c],
             };
             let values = (0..self.values.len()).map(at).collect();
             Some(Refined { values, starts: fitted.starts.clone() })

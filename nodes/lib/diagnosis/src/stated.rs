@@ -199,16 +199,21 @@ impl Asked<'_, '_, '_, '_> {
         })
     }
 
+    /// The free terms of a site that a configuration has.
+    fn free_terms(&self, of: &Tried, site: Site) -> Vec<usize> {
+        let columns = self.around.columns;
+        let terms = columns.of_site(site).map(|c| columns.term_of_flexible(c));
+        terms.filter(|&t| of.chosen[t] > 0).collect()
+    }
+
     /// Takes out the free terms of one site after the other, the least needed first, as long as they close too little.
     fn without_needless_free_terms(&self, mut now: Tried) -> Tried {
-        let columns = self.around.columns;
         loop {
-            let of = |site: Site| -> Vec<usize> {
-                let terms = columns.of_site(site).map(|c| columns.term_of_flexible(c));
-                terms.filter(|&t| now.chosen[t] > 0).collect()
-            };
-            let parts: Vec<Vec<usize>> =
-                Site::ALL.into_iter().map(of).filter(|terms| !terms.is_empty()).collect();
+            let parts: Vec<Vec<usize>> = Site::ALL
+                .into_iter()
+                .map(|site| self.free_terms(&now, site))
+                .filter(|terms| !terms.is_empty())
+                .collect();
             let tried: Vec<Tried> =
                 parts.into_par_iter().filter_map(|part| self.lacking(&now, &part)).collect();
             let least = tried.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -302,12 +307,18 @@ impl Asked<'_, '_, '_, '_> {
                 effect(term).spec().alike.contains(&effect(t))
                     || effect(t).spec().alike.contains(&effect(term))
             };
+            // Free terms of its site that complete the effect are in the way of what does the whole.
+            let completing: Vec<usize> =
+                effect(term).spec().sites.iter().flat_map(|s| self.free_terms(&now, *s)).collect();
             let swapped = |rival: usize| {
                 let mut chosen = now.chosen.clone();
                 chosen[term] = 0;
                 chosen[rival] = 1;
-                let tried = self.fitted(chosen, now.place()).filter(|t| t.cost.is_finite())?;
-                Some((rival, tried))
+                let mut alone = chosen.clone();
+                completing.iter().for_each(|&t| alone[t] = 0);
+                let tried = [chosen, alone].into_iter().filter_map(|c| self.fitted(c, now.place()));
+                let tried = tried.filter(|t| t.cost.is_finite());
+                Some((rival, tried.min_by(|a, b| a.cost.total_cmp(&b.cost))?))
             };
             let rivals: Vec<usize> = self.effects(&now, false).into_iter().filter(alike).collect();
             let mut tried: Vec<(usize, Tried)> = rivals.into_par_iter().filter_map(swapped).collect();
