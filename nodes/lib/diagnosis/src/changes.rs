@@ -33,6 +33,7 @@ const SAME_FLEXIBLE: f64 = 0.5;
 const OTHER_TIRES: f64 = 10.0;
 /// Share of a dispersion above which it is the same.
 const SETTLED: f64 = 0.95;
+
 /// The differences of two drives.
 #[derive(Debug, Clone)]
 pub(crate) struct Compared {

@@ -178,6 +178,29 @@ fn of_two_drives_only_what_has_changed_is_told() {
 }
 
 #[test]
+fn a_large_constant_change_and_one_of_a_later_parameter_are_named() {
+    let car = CarParameters::by_name("formula_student").unwrap();
+    let vehicle = nominal(&car);
+    let [before, tilted] = [(&[][..], 93), (&["imu_tilt=0.06"], 94)]
+        .map(|(effects, seed)| drive_at(&car, effects, 0.8, 60.0, seed).unwrap());
+    let earlier = Earlier::diagnosed(&Request::new(&before, &vehicle), &mut |_| {}).unwrap();
+    let since = |drive: &StateSequence| {
+        let request = Request { earlier: Some(&earlier), ..Request::new(drive, &vehicle) };
+        diagnose(&request, &mut |_| {}).unwrap()
+    };
+    let d = since(&tilted);
+    assert_eq!(named(&d), ["imu_tilt"], "{}", text(&d));
+    let change = d.changes.iter().find(|c| c.name == "imu_tilt").unwrap();
+    assert_eq!(change.parameter, Some("roll_rad"), "{}", text(&d));
+    assert!((change.difference.low..=change.difference.high).contains(&0.06), "{}", text(&d));
+    // The slope's mean stays, its sine does not.
+    let d = since(&drive_at(&car, &["road_slope=0.03"], 0.8, 60.0, 94).unwrap());
+    assert_eq!(named(&d), ["road_slope"], "{}", text(&d));
+    let change = d.changes.iter().find(|c| c.name == "road_slope").unwrap();
+    assert_eq!(change.parameter, Some("angle_rad"), "{}", text(&d));
+}
+
+#[test]
 fn drives_in_one_state_are_explained_together_and_one_in_another_contradicts() {
     const LAG: &str = "steering_lag=0.08";
     let small = CarParameters::by_name("f1tenth").unwrap();

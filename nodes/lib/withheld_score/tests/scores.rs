@@ -102,6 +102,13 @@ fn a_comparison_is_judged_by_what_has_changed() {
         compared(Kind::Single, vec![bias()], "effects", vec![change(0.025)]),
         compared(Kind::Single, vec![bias()], "effects", vec![change(0.05)]),
         compared(Kind::Single, vec![bias()], "no_gap", vec![]),
+        // A figure of another parameter is not held against the true size.
+        compared(
+            Kind::Single,
+            vec![bias()],
+            "effects",
+            vec![SaidChange { parameter: Some("other".to_owned()), ..change(0.5) }],
+        ),
     ];
     let scores = Scores::of(&answers, BTreeMap::new(), Targets::fixed().unwrap());
     let rate = |start: &str| {
@@ -109,8 +116,8 @@ fn a_comparison_is_judged_by_what_has_changed() {
         (rate.hits, rate.of)
     };
     assert_eq!(rate("no effect"), (2, 3));
-    assert_eq!(rate("one effect: its site"), (2, 3));
-    assert_eq!(rate("one effect: first name exact"), (2, 3));
+    assert_eq!(rate("one effect: its site"), (3, 4));
+    assert_eq!(rate("one effect: first name exact"), (3, 4));
     // The difference, not the size of the later drive.
     assert_eq!(rate("90 % intervals"), (1, 2));
 }
