@@ -43,7 +43,7 @@ pub fn without_effects(
     for (effect, own) in &held {
         effect.car(own, &mut car);
         for run in &mut true_inputs.runs {
-            effect.steer(own, &mut run.steering_rad, run.dt_s);
+            run.steer(*effect, own);
         }
     }
     let speed_factor: f64 = car.speed_factor;
@@ -119,6 +119,8 @@ fn applied(sequence: &StateSequence, corrections: &[Correction], speed_factor: f
         out.v_x_mps[i] = (f64::from(out.v_x_mps[i]) * speed_factor) as f32;
     }
     out.retain(|i| kept[i]);
+    // What is left is the wheels' angle, and no command.
+    out.command_steering_rad.clear();
     out
 }
 

@@ -182,7 +182,10 @@ pub(crate) fn explain(
     };
     // What cannot be right comes right after the errors: it explains more than any effect.
     reasons.splice(1..1, plausible::doubts(&recording, request.vehicle));
-    reasons.extend(held_command(null.parameters[HOLD]));
+    // By its stamps a command is held as it is; an angle without any may still be one.
+    if !recording.steering_is_held() {
+        reasons.extend(held_command(null.parameters[HOLD]));
+    }
     reasons.extend(request.earlier.map(Earlier::text));
     reasons.extend(noise::caveat(&recording));
     let effects = match &differences {

@@ -88,6 +88,13 @@ impl<'a> Engine<'a> {
         spec.size[0] * (spec.size[1] / spec.size[0]).powf(self.size_place)
     }
 
+    /// What is known of the hold: mean and standard deviation. A command is held until the next, and its stamp is known to what clocks differ by; an angle
+    /// without such stamps may be one or move on between samples.
+    pub(crate) fn hold_s(&self) -> [f64; 2] {
+        let shares = if self.recording.steering_is_held() { [0.5, 0.1] } else { [0.25, 0.25] };
+        shares.map(|share| share * self.recording.dt_s())
+    }
+
     /// Tires and hold of the nominal model.
     pub(crate) fn nominal_base(&self) -> Vec<f64> {
         let mut p = self.nominal.to_parameters().to_vec();

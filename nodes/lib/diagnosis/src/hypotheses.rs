@@ -34,9 +34,10 @@ pub(crate) fn terms(
         })
         .collect();
     let dt_s = engine.recording.dt_s();
+    let [mean_s, sigma_s] = engine.hold_s();
     let hold = ColumnPrior {
-        offset: 0.25 * dt_s - values[HOLD],
-        sigma: vec![0.25 * dt_s],
+        offset: mean_s - values[HOLD],
+        sigma: vec![sigma_s],
         bounds: [-values[HOLD], 0.5 * dt_s - values[HOLD]],
     };
     let mut out = vec![

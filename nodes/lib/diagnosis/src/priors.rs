@@ -53,6 +53,7 @@ impl Engine<'_> {
             })
             .collect();
         let dt_s = self.recording.dt_s();
+        let [mean_s, sigma_s] = self.hold_s();
         // A command that is late is a command, and held until the next; a measured angle is neither.
         let commanded = effects.iter().any(|e| e.spec().of_a_command);
         out.push(Parameter {
@@ -60,7 +61,7 @@ impl Engine<'_> {
             low: 0.0,
             high: 0.5 * dt_s,
             free: !commanded,
-            prior: None,
+            prior: self.recording.steering_is_held().then_some(Prior { mean: mean_s, sigma: sigma_s }),
         });
         for effect in effects {
             let claimed = named.contains(effect);

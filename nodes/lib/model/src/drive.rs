@@ -9,6 +9,7 @@ use crate::effects::{EffectId, Wheels};
 use crate::model::{BASE, ExtendedModel, TIRES};
 use crate::motion::{Mover, Moving};
 use crate::recording::{Recording, Run};
+use crate::road_wheels::RoadWheels;
 use crate::rollout::Window;
 use crate::station::Laps;
 use crate::terms::{Car, Outputs};
@@ -185,9 +186,8 @@ impl Drive {
         };
         drive.wheel_rad = drive.follow(inputs.steering_rad, JUMP_S);
         drive.set_step(inputs, inputs, driven.substep_s);
-        let steering_rad = [drive.wheel_rad; 2];
-        drive.moving =
-            drive.with_mover(&steering_rad, |mover| mover.begin([v_y_mps, yaw_rate_radps], [0.0; 2]));
+        let wheels = RoadWheels::line(drive.wheel_rad, drive.wheel_rad);
+        drive.moving = drive.with_mover(&wheels, |mover| mover.begin([v_y_mps, yaw_rate_radps], [0.0; 2]));
         drive.sense(driven.substep_s);
         drive
     }
@@ -271,18 +271,19 @@ impl Drive {
     }
 
     fn advance(&mut self, from: Inputs, to: Inputs, dt_s: f64) {
-        let steering_rad = [self.wheel_rad, self.follow(to.steering_rad, dt_s)];
+        let wheel_rad = self.follow(to.steering_rad, dt_s);
+        let wheels = RoadWheels::line(self.wheel_rad, wheel_rad);
         self.set_step(from, to, dt_s);
         let mut moving = self.moving;
-        self.with_mover(&steering_rad, |mover| mover.advance(0, &mut moving, [0.0; 2]));
+        self.with_mover(&wheels, |mover| mover.advance(0, &mut moving, [0.0; 2]));
         self.moving = moving;
-        self.wheel_rad = steering_rad[1];
+        self.wheel_rad = wheel_rad;
     }
 
-    fn with_mover<R>(&self, steering_rad: &[f64; 2], then: impl FnOnce(&Mover<'_, '_, f64>) -> R) -> R {
+    fn with_mover<R>(&self, wheels: &RoadWheels<f64>, then: impl FnOnce(&Mover<'_, '_, f64>) -> R) -> R {
         let tires = OwnTires::from_parameters(&self.parameters[..TIRES]);
         let model = self.model();
-        then(&Mover::new(&model, &self.parameters, &self.car, tires, steering_rad, 0, &STEP))
+        then(&Mover::new(&model, &self.parameters, &self.car, tires, wheels, &STEP))
     }
 
     fn model(&self) -> ExtendedModel<'_> {
@@ -340,6 +341,7 @@ fn step_of(on_course: bool, has_command: bool, smooth: [f64; 2]) -> Recording {
             dt_s: JUMP_S,
             v_x_mps: two(),
             steering_rad: two(),
+            held_steering_rad: Vec::new(),
             a_x_mps2: two(),
             recorded_a_x_mps2: two(),
             force_x_mps2: two(),

@@ -49,6 +49,7 @@ mod model;
 mod motion;
 pub mod noise;
 mod recording;
+mod road_wheels;
 mod rollout;
 mod site;
 mod smooth;

@@ -1,6 +1,6 @@
 //! The single-track model with effects: what is fitted, and how it is run over a window.
 //!
-//! With no effect, or with all at their null values, it is exactly `vehicle::SingleTrack`. Parameters, in order: the tires (cornering stiffness
+//! With no effect, or with all at their null values, it is exactly `vehicle::SingleTrack` with the inertia of the turning wheels in its yaw inertia. Parameters, in order: the tires (cornering stiffness
 //! over load B C D, C, D, E; front, then rear), the hold of the steering command, then those of the effects, then those of the
 //! flexible terms.
 
@@ -12,17 +12,16 @@ use crate::effects::EffectId;
 use crate::flexible::Flexible;
 use crate::motion::Mover;
 use crate::recording::{Channel, Recording};
-use crate::terms::{Car, Outputs, delayed};
+use crate::road_wheels::RoadWheels;
+use crate::terms::{Car, Outputs};
 
 /// Parameters of the tires.
 pub const TIRES: usize = OWN_TIRE_PARAMETERS;
-/// Place of the hold of the command: how long after its stamp a recorded steering angle acts, within one sample.
+/// Place of the hold of the command: how long after its stamp a recorded steering angle acts, within one sample. A command that jumps at its stamp and is
+/// held until the next is on average half a sample late, a course that moves on between samples not at all.
 pub const HOLD: usize = TIRES;
 /// Parameters before those of the effects.
 pub const BASE: usize = TIRES + 1;
-
-/// Time before a window from which the steering is followed.
-const RUN_IN_S: f64 = 0.6;
 
 /// The model with a list of effects, on a recording.
 #[derive(Debug, Clone)]
@@ -66,23 +65,6 @@ impl<'a> ExtendedModel<'a> {
     /// Parameters of the flexible terms.
     pub fn flexible_parameters<'p, T>(&self, p: &'p [T]) -> &'p [T] {
         &p[BASE + self.effects.iter().map(|e| e.spec().parameters.len()).sum::<usize>()..]
-    }
-
-    /// Road-wheel angles from some time before the window on, and how many samples lie before it.
-    fn road_wheel_angles<T: Real>(&self, p: &[T], window: &Window) -> (Vec<T>, usize) {
-        let run = &self.recording.runs[window.segment];
-        let run_in = ((RUN_IN_S / run.dt_s).ceil() as usize).min(window.from);
-        // One sample more than the window: delays interpolate with both neighbours.
-        let to = (window.from + window.len + 1).min(run.len());
-        let series: Vec<T> = run.steering_rad[window.from - run_in..to].iter().map(|&u| T::from(u)).collect();
-        let mut series = delayed(&series, p[HOLD], run.dt_s);
-        for (effect, values) in self.with_parameters(p) {
-            effect.steer(values, &mut series, run.dt_s);
-        }
-        if let Some(flexible) = &self.flexible {
-            flexible.steer(self.flexible_parameters(p), run, window.from - run_in, &mut series);
-        }
-        (series, run_in)
     }
 
     fn flatten<T: Real>(&self, outputs: &Outputs<T>, window: &Window, out: &mut Vec<T>) {
@@ -168,8 +150,8 @@ impl<'a> ExtendedModel<'a> {
         for (effect, values) in self.with_parameters(p) {
             effect.car(values, &mut car);
         }
-        let (steering, run_in) = self.road_wheel_angles(p, window);
-        let mut outputs = Mover::new(self, p, &car, tires, &steering, run_in, window).run(start, push);
+        let wheels = RoadWheels::of(self, p, window);
+        let mut outputs = Mover::new(self, p, &car, tires, &wheels, window).run(start, push);
         self.sense(p, car.cog_shift_m, &mut outputs);
         outputs
     }
@@ -272,7 +254,11 @@ pub(crate) mod tests {
         let mut base = tires().to_parameters().to_vec();
         base.push(0.0);
         // The nominal model, stepped by its own crate, on the same tires as the fit sees them.
-        let car = SingleTrack::new(&vehicle, &OwnTires::from_parameters(&base).assumed_effective());
+        let turned = VehicleParameters {
+            yaw_inertia_kgm2: vehicle.yaw_inertia_kgm2 + crate::terms::wheels_kgm2(&vehicle),
+            ..vehicle.clone()
+        };
+        let car = SingleTrack::new(&turned, &OwnTires::from_parameters(&base).assumed_effective());
         let input = |k: usize| Input { v_x_mps: run.v_x_mps[k], steering_rad: run.steering_rad[k] };
         let mut x = State { v_y_mps: 0.05, yaw_rate_radps: 0.4 };
         let mut expected = vec![[x.v_y_mps, x.yaw_rate_radps]];

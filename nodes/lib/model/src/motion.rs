@@ -9,13 +9,11 @@ use gripsight_vehicle::{OwnTires, Real};
 use crate::effects::Lagging;
 use crate::flexible::Push;
 use crate::model::ExtendedModel;
-use crate::terms::{Axle, Axles, Car, Lag, Moment, Motion, Outputs, Sprung};
+use crate::road_wheels::{RoadWheels, at_once};
+use crate::terms::{Axle, Axles, Car, Lag, Moment, Motion, Outputs, Sprung, TURNING_SHARE};
 
 /// Below this forward speed slip angles mean nothing; the model is evaluated as if at this speed.
 const MIN_SPEED_MPS: f64 = 0.2;
-/// What the inertia of the turning wheels adds to the mass along the road, as a share of it. A command speaks of the car's own acceleration:
-/// the wheels' is on top of it, and everything else that pushes has to turn them, too. Wong, Theory of Ground Vehicles, section 3.1: 1.04 and more.
-const TURNING_SHARE: f64 = 0.06;
 
 /// Runs the car over one window.
 pub(crate) struct Mover<'m, 'a, T> {
@@ -24,10 +22,7 @@ pub(crate) struct Mover<'m, 'a, T> {
     car: &'m Car<T>,
     axles_at_rest: Axles<T>,
     tires: OwnTires<T>,
-    /// Road-wheel angles before the window, up to its start.
-    before: &'m [T],
-    /// Road-wheel angles in the window.
-    steering: &'m [T],
+    wheels: &'m RoadWheels<T>,
     window: &'m Window,
     relaxes: bool,
     rolls: bool,
@@ -48,6 +43,8 @@ struct Extra<T> {
 struct Instant<'e, T> {
     v_x_mps: T,
     steering_rad: T,
+    /// What the wheels are beyond that, just after a jump of their command: the tires have not rolled on it yet.
+    jump_rad: f64,
     a_x_mps2: f64,
     carried_a_x_mps2: T,
     force_x_mps2: f64,
@@ -110,17 +107,14 @@ impl Moving<f64> {
 }
 
 impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
-    /// `steering` begins `run_in` samples before the window.
     pub(crate) fn new(
         model: &'m ExtendedModel<'a>,
         p: &'m [T],
         car: &'m Car<T>,
         tires: OwnTires<T>,
-        steering: &'m [T],
-        run_in: usize,
+        wheels: &'m RoadWheels<T>,
         window: &'m Window,
     ) -> Self {
-        let (before, steering) = steering.split_at(run_in);
         let dt_s = model.recording.runs[window.segment].dt_s;
         let lags = |what| model.effects.iter().any(|e| e.spec().lagging.contains(&what));
         Self {
@@ -129,8 +123,7 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
             car,
             axles_at_rest: car.axles_at_rest(),
             tires,
-            before,
-            steering,
+            wheels,
             window,
             relaxes: lags(Lagging::Slip) && car.relaxation_m.re() >= 0.0,
             rolls: lags(Lagging::Roll),
@@ -234,9 +227,9 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         let zero = T::from(0.0);
         let mut steady = [zero; 2];
         let mut slip = [zero; 2];
-        let count = self.before.len();
-        for (i, &steering_rad) in self.before.iter().chain(self.steering.first()).enumerate() {
-            let k = start + i - count;
+        let count = self.wheels.run_in();
+        for i in 0..=count {
+            let (k, steering_rad) = (start + i - count, self.wheels.at_sample_rad(i));
             let v_x = self.car.speed_factor * run.v_x_mps[k].max(MIN_SPEED_MPS);
             let (v_y, r) = (run.smooth[0][k], run.smooth[1][k]);
             let now = [
@@ -284,7 +277,6 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
     fn instant<'e>(&self, k: usize, share: f64, extra: &'e Extra<T>) -> Instant<'e, T> {
         let run = &self.model.recording.runs[self.window.segment];
         let (a, b) = (self.window.from + k, (self.window.from + k + 1).min(run.len() - 1));
-        let next = (k + 1).min(self.steering.len() - 1);
         let mix = |s: &[f64]| s[a] + (s[b] - s[a]) * share;
         // The lap's end is not a place to interpolate across.
         let lap = &run.lap_share;
@@ -296,7 +288,8 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         let true_mps = self.car.speed_factor * v_x_mps;
         Instant {
             v_x_mps: more.map_or(true_mps, |more| true_mps * more),
-            steering_rad: self.steering[k] + (self.steering[next] - self.steering[k]) * share,
+            steering_rad: self.wheels.angle_rad(k, share),
+            jump_rad: self.wheels.jump_rad(k, share),
             a_x_mps2,
             carried_a_x_mps2: {
                 let [from, to] = extra.carried_a_x_mps2;
@@ -364,6 +357,7 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
             front_rad - ((v_y + r * car.l_f_m) / v_x).atan(),
             axles.rear.steer_rad - ((v_y - r * car.l_r_m) / v_x).atan(),
         ];
+        let mut jump_rad = now.jump_rad;
         let mut slip_rad = steady_rad;
         if relaxes && h_s > 0.0 {
             let lag = Lag::new(h_s, car.relaxation_m / v_x);
@@ -373,10 +367,13 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         } else if relaxes {
             slip_rad = memory.slip_rad;
         }
+        if relaxes {
+            jump_rad *= at_once(car.relaxation_m.re() / v_x.re());
+        }
         let force = |axle: &Axle<T>, tire: &gripsight_vehicle::MagicFormula<T>, slip: T| {
             tire.normalized_force(slip / axle.grip) * axle.grip * axle.usable
         };
-        let front_use = force(&axles.front, &self.tires.front, slip_rad[0]);
+        let front_use = force(&axles.front, &self.tires.front, slip_rad[0] + jump_rad);
         let rear_use = force(&axles.rear, &self.tires.rear, slip_rad[1]);
         let (sin, cos) = now.steering_rad.sin_cos();
         let front_n = front_use * axles.front.carried_n(self.axles_at_rest.front.load_n);
@@ -394,7 +391,7 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         };
         let front_y_n = if commanded { front_n * cos + sin * front_x_n } else { front_n * cos };
         let mut a_y = (rear_n + front_y_n) / car.mass_kg + motion.force_y_mps2 + now.extra.push[0];
-        let mut yaw_radps2 = (front_y_n * car.l_f_m - rear_n * car.l_r_m) / car.yaw_inertia_kgm2
+        let mut yaw_radps2 = (front_y_n * car.l_f_m - rear_n * car.l_r_m) / car.turned_kgm2()
             + motion.yaw_radps2
             + now.extra.push[1];
         if let Some(flexible) = &model.flexible {
@@ -414,6 +411,7 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
             motion.gravity_y_mps2 += push.gravity_y_mps2;
         }
         let along_mps2 = if commanded {
+            // A command speaks of the car's own acceleration: the wheels' is on top of it, and everything else that pushes has to turn them, too.
             let turning_kg = TURNING_SHARE * car.nominal_mass_kg;
             let commanded_n = now.force_x_mps2 * (car.nominal_mass_kg + turning_kg);
             let pushed_mps2 = motion.force_x_mps2 + motion.gravity_x_mps2;

@@ -125,6 +125,7 @@ mod tests {
             dt_s: 0.01,
             v_x_mps: vec![1.0; n],
             steering_rad: vec![0.0; n],
+            held_steering_rad: Vec::new(),
             a_x_mps2: vec![0.0; n],
             force_x_mps2: vec![0.0; n],
             recorded_a_x_mps2: vec![0.0; n],

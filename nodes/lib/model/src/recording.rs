@@ -78,6 +78,8 @@ pub struct Run {
     pub v_x_mps: Vec<f64>,
     /// Recorded steering angle, left positive.
     pub steering_rad: Vec<f64>,
+    /// Commanded steering angle from each sample to the next, on average; empty where the steering is a measured angle.
+    pub held_steering_rad: Vec<f64>,
     /// Longitudinal acceleration (specific force), smoothed; from speed and yaw rate where none is recorded.
     pub a_x_mps2: Vec<f64>,
     /// The same as it was recorded, where it was.
@@ -109,6 +111,24 @@ impl Run {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.v_x_mps.is_empty()
+    }
+
+    /// Whether the steering is a command, which stays what it is from its stamp to the next one's; else it is an angle that moves on between samples.
+    #[must_use]
+    pub fn steering_is_held(&self) -> bool {
+        !self.held_steering_rad.is_empty()
+    }
+
+    /// The steering in even steps: of a held command its mean from each sample to the next, else the angle at each sample.
+    #[must_use]
+    pub fn steering_course_rad(&self) -> &[f64] {
+        if self.steering_is_held() { &self.held_steering_rad } else { &self.steering_rad }
+    }
+
+    /// Puts an effect with parameters `own` between the recorded steering and what it stands for.
+    pub fn steer(&mut self, effect: crate::EffectId, own: &[f64]) {
+        effect.steer(own, &mut self.steering_rad, self.dt_s);
+        effect.steer_held(own, &mut self.held_steering_rad, self.dt_s);
     }
 
     /// Time of sample `k` since the recording's first.
@@ -228,6 +248,12 @@ impl Recording {
         })
     }
 
+    /// Whether the steering is a command; see [`Run::steering_is_held`].
+    #[must_use]
+    pub fn steering_is_held(&self) -> bool {
+        self.runs.iter().any(Run::steering_is_held)
+    }
+
     /// Step between samples.
     #[must_use]
     pub fn dt_s(&self) -> f64 {
@@ -332,6 +358,7 @@ fn run(s: &Segment, laps: &Laps, lap_share: &[f64], channels: &[Channel]) -> Run
         dt_s: s.dt_s,
         v_x_mps,
         steering_rad: s.steering_rad.clone(),
+        held_steering_rad: s.command_steering_rad.clone(),
         recorded_a_x_mps2: if s.a_x_mps2.is_empty() { a_x_mps2.clone() } else { s.a_x_mps2.clone() },
         a_x_mps2,
         force_x_mps2,

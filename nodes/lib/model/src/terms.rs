@@ -9,8 +9,10 @@ pub struct Car<T> {
     pub mass_kg: T,
     /// Mass that the vehicle file states: what commanded accelerations refer to.
     pub nominal_mass_kg: f64,
-    /// Yaw inertia.
+    /// Yaw inertia, of a car whose wheels stand still.
     pub yaw_inertia_kgm2: T,
+    /// What the turning wheels add to it: in yaw the outer ones are turned faster, the inner ones slower.
+    pub wheels_kgm2: f64,
     /// Centre of gravity to front axle.
     pub l_f_m: T,
     /// Centre of gravity to rear axle.
@@ -35,6 +37,19 @@ pub struct Car<T> {
     pub brake_front_share: T,
 }
 
+/// What the inertia of the turning wheels adds to the mass along the road, as a share of it. Wong, Theory of Ground Vehicles, section 3.1: 1.04 and more.
+pub(crate) const TURNING_SHARE: f64 = 0.06;
+
+/// Track over wheelbase: 0.55 of long road cars to 0.8 of formula and 1:10 cars.
+const TRACK_SHARE: f64 = 0.7;
+
+/// Yaw inertia of the turning of the wheels. A wheel half a track t off the middle runs at v_x -+ r t/2: what of the mass they add along the road, they add
+/// to the yaw inertia at that lever, whatever moment yaw_inertia_kgm2 was measured with.
+pub(crate) fn wheels_kgm2(vehicle: &VehicleParameters) -> f64 {
+    let lever_m = 0.5 * TRACK_SHARE * vehicle.wheelbase_m();
+    TURNING_SHARE * vehicle.mass_kg * lever_m * lever_m
+}
+
 /// Time in which a car's body follows the lateral acceleration in roll, where nothing is known of it: 2 zeta/omega of a body that rolls at 3.5 Hz with
 /// half of the critical damping. Between 1.5 Hz and 5 Hz, at a third to two thirds of it: 0.02 to 0.1 s.
 pub(crate) const ROLL_TIME_S: f64 = 0.045;
@@ -43,12 +58,18 @@ pub(crate) const ROLL_TIME_S: f64 = 0.045;
 pub(crate) const PITCH_FREQUENCY_HZ: f64 = 4.0;
 
 impl<T: Real> Car<T> {
+    /// Yaw inertia that a moment has to turn, wheels included.
+    pub fn turned_kgm2(&self) -> T {
+        self.yaw_inertia_kgm2 + self.wheels_kgm2
+    }
+
     /// The car as the vehicle file states it.
     pub fn nominal(vehicle: &VehicleParameters, peak: [T; 2]) -> Self {
         Self {
             mass_kg: T::from(vehicle.mass_kg),
             nominal_mass_kg: vehicle.mass_kg,
             yaw_inertia_kgm2: T::from(vehicle.yaw_inertia_kgm2),
+            wheels_kgm2: wheels_kgm2(vehicle),
             l_f_m: T::from(vehicle.l_f_m),
             l_r_m: T::from(vehicle.l_r_m),
             cog_shift_m: T::from(0.0),

@@ -22,6 +22,8 @@ macro_rules! segment {
             /// Step of the grid.
             pub dt_s: f64,
             $(#[doc = concat!("`", $unit, "`: ", $meaning)] pub $name: Vec<f64>,)*
+            /// [rad] commanded steering angle, its mean from the sample to the next
+            pub command_steering_rad: Vec<f64>,
             /// [m/s] commanded speed, its mean from the sample to the next
             pub command_speed_mps: Vec<f64>,
             /// [m/s^2] commanded acceleration, its mean from the sample to the next
@@ -41,6 +43,7 @@ macro_rules! segment {
                     start_time_s,
                     dt_s,
                     $($name: even(&sequence.$name),)*
+                    command_steering_rad: held(&sequence.command_steering_rad),
                     command_speed_mps: held(&sequence.command_speed_mps),
                     command_acceleration_mps2: held(&sequence.command_acceleration_mps2),
                 }
@@ -86,8 +89,8 @@ pub(crate) fn median_step_s(time_s: &[f32]) -> f64 {
 }
 
 /// Splits a sequence at its gaps (a pause over 2.5 median steps) and puts each stretch on an even grid of the median step, by linear
-/// interpolation (the steering too: it stands on odometry stamps already). A longitudinal command stays what it was from its stamp to the next one's
-/// and is averaged over each step. Stretches shorter than `min_length_s` are left out.
+/// interpolation (the steering too: it stands on odometry stamps already). A command stays what it was from its stamp to the next one's and is
+/// averaged over each step. Stretches shorter than `min_length_s` are left out.
 ///
 /// # Errors
 /// What [`StateSequence::check`] finds.
@@ -145,16 +148,23 @@ fn held(stamps_s: &[f32], values: &[f32], start_time_s: f64, dt_s: f64, count: u
     if values.is_empty() {
         return Vec::new();
     }
-    let mut k = stamps_s.partition_point(|&t| f64::from(t) <= start_time_s).saturating_sub(1);
+    // float32 seconds: stamps that were one may come out as two, this far apart.
+    let same_by = |time_s: f64| time_s + 2e-5 + time_s.abs() * f64::from(f32::EPSILON);
+    let stamp_s = |k: usize| stamps_s.get(k).map_or(f64::INFINITY, |&t| f64::from(t));
+    let mut k = 0;
     let mean = |i: usize| {
-        let (mut t_s, end_s) = (start_time_s + i as f64 * dt_s, start_time_s + (i + 1) as f64 * dt_s);
-        let mut integral = 0.0;
-        while let Some(next_s) = stamps_s.get(k + 1).map(|&t| f64::from(t)).filter(|&t| t < end_s) {
-            integral += f64::from(values[k]) * (next_s - t_s).max(0.0);
-            t_s = t_s.max(next_s);
+        let (from_s, to_s) = (start_time_s + i as f64 * dt_s, start_time_s + (i + 1) as f64 * dt_s);
+        while stamp_s(k + 1) <= same_by(from_s) {
             k += 1;
         }
-        (integral + f64::from(values[k]) * (end_s - t_s)) / dt_s
+        // To the last bit the command itself where one holds throughout.
+        let mut mean = f64::from(values[k]);
+        while same_by(stamp_s(k + 1)) < to_s {
+            k += 1;
+            let change = f64::from(values[k]) - f64::from(values[k - 1]);
+            mean += change * ((to_s - stamp_s(k)) / dt_s).min(1.0);
+        }
+        mean
     };
     (0..count).map(mean).collect()
 }
@@ -198,6 +208,7 @@ mod tests {
         sequence.command_time_s = vec![0.105, 0.5025];
         sequence.command_acceleration_mps2 = vec![1.0, -3.0];
         sequence.command_speed_mps = vec![0.0, 0.0];
+        sequence.command_steering_rad = vec![0.1, 0.2];
         let part = &segments(&sequence, 0.5).unwrap()[0];
         for (k, &found) in part.command_acceleration_mps2.iter().enumerate() {
             let expected = match k {
@@ -207,6 +218,9 @@ mod tests {
             };
             approx::assert_abs_diff_eq!(found, expected, epsilon = 1e-4);
         }
+        let steering = &part.command_steering_rad;
+        assert!((0..50).all(|k| steering[k] == f64::from(0.1_f32)), "{steering:?}");
+        assert!((51..100).all(|k| steering[k] == f64::from(0.2_f32)), "{steering:?}");
     }
 
     #[test]

@@ -33,7 +33,7 @@ impl Effect for DifferentialYawMoment {
         let share = if at.force_x_mps2 > 0.0 { 1.0 } else { OFF_POWER };
         let turn = (at.yaw_rate_radps * length_m / at.v_x_mps).tanh();
         motion.yaw_radps2 -=
-            p[0] * car.mass_kg * (GRAVITY_MPS2 * share) * length_m * turn / car.yaw_inertia_kgm2;
+            p[0] * car.mass_kg * (GRAVITY_MPS2 * share) * length_m * turn / car.turned_kgm2();
     }
 }
 
@@ -53,7 +53,7 @@ mod tests {
         };
         let turn = (at.yaw_rate_radps * car.wheelbase_m() / at.v_x_mps).tanh();
         let moment_nm = 0.05 * car.mass_kg * GRAVITY_MPS2 * car.wheelbase_m() * turn;
-        approx::assert_relative_eq!(yaw_radps2(1.0), -moment_nm / car.yaw_inertia_kgm2, epsilon = 1e-9);
+        approx::assert_relative_eq!(yaw_radps2(1.0), -moment_nm / car.turned_kgm2(), epsilon = 1e-9);
         approx::assert_relative_eq!(yaw_radps2(-1.0), 0.5 * yaw_radps2(1.0), epsilon = 1e-9);
     }
 }

@@ -99,6 +99,11 @@ pub trait Effect {
         }
     }
 
+    /// The same for a held command: a series of its means over each step, of which it makes those of the wheels.
+    fn steer_held<T: Real>(p: &[T], steering_rad: &mut [T], dt_s: f64) {
+        Self::steer(p, steering_rad, dt_s);
+    }
+
     /// Changes constants of the car.
     fn car<T: Real>(_p: &[T], _car: &mut Car<T>) {}
 
@@ -150,6 +155,13 @@ macro_rules! library {
             pub fn steer<T: Real>(self, p: &[T], steering_rad: &mut [T], dt_s: f64) {
                 match self {
                     $(Self::$variant => <$effect>::steer(p, steering_rad, dt_s),)+
+                }
+            }
+
+            /// [`Effect::steer_held`] with its parameters `p`.
+            pub fn steer_held<T: Real>(self, p: &[T], steering_rad: &mut [T], dt_s: f64) {
+                match self {
+                    $(Self::$variant => <$effect>::steer_held(p, steering_rad, dt_s),)+
                 }
             }
 

@@ -52,6 +52,15 @@ impl Effect for SteeringRateLimit {
         };
         wheel[0]
     }
+
+    /// The wheels go after a jump from the step's start on: in the middle of the step they have made half a step's way.
+    fn steer_held<T: Real>(p: &[T], steering_rad: &mut [T], dt_s: f64) {
+        let mut wheels = Wheels::default();
+        for angle in steering_rad {
+            let [middle, _] = [(); 2].map(|()| Self::follow(p, &mut wheels, *angle, 0.5 * dt_s));
+            *angle = middle;
+        }
+    }
 }
 
 #[cfg(test)]
@@ -65,6 +74,11 @@ mod tests {
         let mut wheels = [0.0, 0.05, 0.05, 0.05, 0.05];
         SteeringRateLimit::steer(&[0.5], &mut wheels, 0.01);
         for (wheel, expected) in wheels.iter().zip(&[0.0, 0.02, 0.04, 0.05, 0.05]) {
+            approx::assert_relative_eq!(wheel, expected, epsilon = 1e-12);
+        }
+        let mut wheels = [0.0, 0.05, 0.05, 0.05, 0.05];
+        SteeringRateLimit::steer_held(&[0.5], &mut wheels, 0.01);
+        for (wheel, expected) in wheels.iter().zip(&[0.0, 0.01, 0.03, 0.05, 0.05]) {
             approx::assert_relative_eq!(wheel, expected, epsilon = 1e-12);
         }
         let stated = SteeringRateLimit::SPEC.reported[0].value;

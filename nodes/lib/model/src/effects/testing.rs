@@ -60,6 +60,8 @@ pub(super) fn assert_absent_at_null<E: Effect>() {
     let mut angles = steering();
     E::steer(&null, &mut angles, DT_S);
     assert_eq!(angles, steering());
+    E::steer_held(&null, &mut angles, DT_S);
+    assert_eq!(angles, steering());
     let mut changed = car();
     E::car(&null, &mut changed);
     assert_eq!(format!("{changed:?}"), format!("{:?}", car()));

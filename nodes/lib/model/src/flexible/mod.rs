@@ -78,7 +78,8 @@ impl Flexible {
         let runs = &recording.runs;
         let speed_mps = recording.typical_speed_mps().max(0.5);
         let yaw = rms(runs.iter().flat_map(|r| r.measured[1].iter().copied()));
-        let rate = |r: &Run| (0..r.len()).map(|k| slope(&r.steering_rad, k, r.dt_s)).collect::<Vec<_>>();
+        let rate =
+            |r: &Run| (0..r.len()).map(|k| slope(r.steering_course_rad(), k, r.dt_s)).collect::<Vec<_>>();
         Self {
             blocks: sites.iter().flat_map(|site| blocks::of_site(*site)).copied().collect(),
             groups: sites.iter().copied().map(Group::of).collect(),
@@ -87,7 +88,7 @@ impl Flexible {
             a_x_mps2: rms(runs.iter().flat_map(|r| r.a_x_mps2.iter().copied())),
             a_y_mps2: (yaw * speed_mps).max(0.5),
             yaw_acceleration: (yaw * speed_mps / wheelbase_m).max(0.5),
-            steering_rad: rms(runs.iter().flat_map(|r| r.steering_rad.iter().copied())),
+            steering_rad: rms(runs.iter().flat_map(|r| r.steering_course_rad().iter().copied())),
             steering_rate_radps: rms(runs.iter().flat_map(rate)),
             minutes: (recording.recorded_s / 60.0).max(1e-3),
             sensed: SENSED.map(|(_, channel)| {
@@ -126,13 +127,13 @@ impl Flexible {
     /// Adds to the road-wheel angles; the first of them belongs to sample `from` of the run.
     pub(crate) fn steer<T: Real>(&self, p: &[T], run: &Run, from: usize, angles: &mut [T]) {
         let Some(own) = self.of(p, Block::Steering) else { return };
-        let size = self.steering_rad;
+        let (size, course) = (self.steering_rad, run.steering_course_rad());
         for (i, angle) in angles.iter_mut().enumerate() {
             let k = (from + i).min(run.len() - 1);
-            let u = run.steering_rad[k] / size;
+            let u = course[k] / size;
             let mut terms = [0.0; Block::Steering.terms()];
-            increments(&mut terms, &run.steering_rad, k, &STEERING_LAGS_S, run.dt_s, size);
-            let rate = slope(&run.steering_rad, k, run.dt_s) / self.steering_rate_radps;
+            increments(&mut terms, course, k, &STEERING_LAGS_S, run.dt_s, size);
+            let rate = slope(course, k, run.dt_s) / self.steering_rate_radps;
             let rest =
                 [0.3, 0.1 * u * u.abs(), 0.1 * u.powi(3), 0.3 * (3.0 * rate).tanh(), 0.1 * rate * rate.abs()];
             terms[STEERING_LAGS_S.len()..].copy_from_slice(&rest);
