@@ -81,6 +81,8 @@ fn fmpy_validates_the_unit_and_drives_it_like_the_model() {
     recording.force_ahead = 0.0;
     let run = &mut recording.runs[0];
     run.steering_rad[1] = run.steering_rad[0];
+    // The unit is told the steering in lines.
+    run.held_steering_rad.clear();
     run.recorded_a_x_mps2.clone_from(&run.a_x_mps2);
     let run = run.clone();
     let car = car();
