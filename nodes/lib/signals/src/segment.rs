@@ -22,11 +22,11 @@ macro_rules! segment {
             /// Step of the grid.
             pub dt_s: f64,
             $(#[doc = concat!("`", $unit, "`: ", $meaning)] pub $name: Vec<f64>,)*
-            /// [rad] commanded steering angle, its mean from the sample to the next
+            /// `rad`: commanded steering angle, its mean from the sample to the next
             pub command_steering_rad: Vec<f64>,
-            /// [m/s] commanded speed, its mean from the sample to the next
+            /// `m/s`: commanded speed, its mean from the sample to the next
             pub command_speed_mps: Vec<f64>,
-            /// [m/s^2] commanded acceleration, its mean from the sample to the next
+            /// `m/s^2`: commanded acceleration, its mean from the sample to the next
             pub command_acceleration_mps2: Vec<f64>,
         }
 
