@@ -26,20 +26,24 @@ impl Objective {
         let (inputs, outputs) = set.channels();
         require_length("channels of the set's inputs", network.config().inputs, inputs)?;
         require_length("channels of the set's targets", network.config().outputs, outputs)?;
-        let total: f64 = set.weights().iter().sum::<f64>() * outputs as f64;
         Ok(Self {
             pipeline: pipeline(network, set, dropout, seed),
             targets: scaled_targets(set, network.normalization()),
-            weights: set.weights().iter().map(|weight| weight / total).collect(),
+            weights: shares(set),
         })
     }
 
     /// Loss without dropout.
     pub(super) fn loss(&mut self, weights: &[f64]) -> Result<f64, Error> {
         self.pipeline.forward(weights, false)?;
-        let length = self.weights.len();
+        Ok(self.passed(&self.weights))
+    }
+
+    /// Loss of the last pass, its samples weighed by `sample_weights` (`(L)`; over their sum times the number of outputs).
+    fn passed(&self, sample_weights: &[f64]) -> f64 {
+        let length = sample_weights.len();
         let rows = self.pipeline.output().chunks_exact(length).zip(self.targets.chunks_exact(length));
-        Ok(rows.map(|(outputs, targets)| squared_error(outputs, targets, &self.weights)).sum())
+        rows.map(|(outputs, targets)| squared_error(outputs, targets, sample_weights)).sum()
     }
 
     /// Loss with dropout, and its gradient.
@@ -60,6 +64,64 @@ impl Objective {
         self.pipeline.backward(weights, gradient)?;
         Ok(loss)
     }
+}
+
+/// What is held out of training, to say when to stop.
+pub(super) enum HeldOut {
+    /// Samples of their own.
+    Apart(Objective),
+    /// Other weights for the samples that are trained on, `(L)`: the pass that training takes anyway tells their loss, too.
+    Beside(Vec<f64>),
+}
+
+impl HeldOut {
+    pub(super) fn new(
+        network: &ResidualNetwork,
+        training: &TrainingSet,
+        held_out: &TrainingSet,
+        dropout: f64,
+    ) -> Result<Self, Error> {
+        if dropout == 0.0 && held_out.has_samples_of(training) {
+            return Ok(Self::Beside(shares(held_out)));
+        }
+        Objective::new(network, held_out, 0.0, 0).map(Self::Apart)
+    }
+
+    pub(super) fn loss(&mut self, objective: &mut Objective, weights: &[f64]) -> Result<f64, Error> {
+        match self {
+            Self::Apart(own) => own.loss(weights),
+            Self::Beside(sample_weights) => {
+                objective.pipeline.forward(weights, false)?;
+                Ok(objective.passed(sample_weights))
+            }
+        }
+    }
+
+    /// The loss, and what `objective` has of [`Objective::loss_and_gradient`] at the same weights.
+    pub(super) fn loss_beside(
+        &mut self,
+        objective: &mut Objective,
+        weights: &[f64],
+        gradient: &mut [f64],
+    ) -> Result<(f64, f64), Error> {
+        match self {
+            Self::Apart(own) => {
+                let (held_out, training) =
+                    rayon::join(|| own.loss(weights), || objective.loss_and_gradient(weights, gradient));
+                Ok((held_out?, training?))
+            }
+            Self::Beside(sample_weights) => {
+                let training = objective.loss_and_gradient(weights, gradient)?;
+                Ok((objective.passed(sample_weights), training))
+            }
+        }
+    }
+}
+
+/// Weights of a set's samples over the sum of all times the number of outputs.
+fn shares(set: &TrainingSet) -> Vec<f64> {
+    let total: f64 = set.weights().iter().sum::<f64>() * set.channels().1 as f64;
+    set.weights().iter().map(|weight| weight / total).collect()
 }
 
 /// Weighted sum of squared differences.

@@ -11,7 +11,7 @@ pub use set::{Sequence, TrainingSet};
 use crate::pipeline::{Layers, Pipeline};
 use crate::{Error, ResidualNetwork};
 use adam::{Adam, Rates};
-use loss::Objective;
+use loss::{HeldOut, Objective};
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
@@ -185,13 +185,17 @@ pub fn train(
 ) -> Result<(ResidualNetwork, TrainingReport), Error> {
     config.validate()?;
     let mut objective = Objective::new(network, training, config.dropout, config.seed)?;
-    let mut held_out = validation.map(|set| Objective::new(network, set, 0.0, 0)).transpose()?;
+    let mut held_out =
+        validation.map(|set| HeldOut::new(network, training, set, config.dropout)).transpose()?;
     let blocks = network.parameter_blocks();
     let mut weights = network.weights().to_vec();
     let mut gradient = vec![0.0; weights.len()];
     let mut adam = Adam::new(weights.len());
 
-    let initial_loss = held_out.as_mut().unwrap_or(&mut objective).loss(&weights)?;
+    let initial_loss = match &mut held_out {
+        Some(held_out) => held_out.loss(&mut objective, &weights)?,
+        None => objective.loss(&weights)?,
+    };
     let mut kept = weights.clone();
     let mut report = TrainingReport {
         epochs: 0,
@@ -224,13 +228,12 @@ pub fn train(
         let mut validation_loss = training_loss;
         if let Some(held_out) = &mut held_out {
             // The next epoch's gradient is of the same weights.
-            let more = epoch + 1 < config.epochs_max;
-            let (held_out_loss, next) = rayon::join(
-                || held_out.loss(&weights),
-                || more.then(|| objective.loss_and_gradient(&weights, &mut gradient)).transpose(),
-            );
-            validation_loss = held_out_loss?;
-            ahead = next?;
+            if epoch + 1 < config.epochs_max {
+                let (loss, next) = held_out.loss_beside(&mut objective, &weights, &mut gradient)?;
+                (validation_loss, ahead) = (loss, Some(next));
+            } else {
+                validation_loss = held_out.loss(&mut objective, &weights)?;
+            }
             report.validation_losses.push(validation_loss);
             if validation_loss < report.best_loss * (1.0 - config.improvement_min) {
                 report.best_loss = validation_loss;

@@ -73,6 +73,14 @@ impl TrainingSet {
         &self.lengths
     }
 
+    /// Whether it differs from another set in weights alone.
+    pub(super) fn has_samples_of(&self, other: &Self) -> bool {
+        self.channels == other.channels
+            && self.lengths == other.lengths
+            && self.inputs == other.inputs
+            && self.targets == other.targets
+    }
+
     /// Number of input and of output channels.
     #[must_use]
     pub fn channels(&self) -> (usize, usize) {

@@ -72,6 +72,26 @@ fn early_stopping_keeps_the_best_weights_and_never_worse_than_the_start() {
 }
 
 #[test]
+fn samples_held_out_of_the_same_sequences_are_judged_as_those_of_others() {
+    let sequence = second_order_lag(1, 2, 300);
+    let part = |held_out: bool| {
+        let weights = (0..300).map(|k| f64::from(u8::from((k / 50 % 2 == 1) == held_out))).collect();
+        TrainingSet::new(2, 2, &[gripsight_s4::Sequence { weights, ..sequence.clone() }]).unwrap()
+    };
+    let (training, beside) = (part(false), part(true));
+    // What a sample of no weight should have been tells nothing, and makes the two sets differ.
+    let mut other = sequence.clone();
+    other.targets[0] += 1.0;
+    let apart =
+        TrainingSet::new(2, 2, &[gripsight_s4::Sequence { weights: beside.weights().to_vec(), ..other }]);
+    let config = NetworkConfig { inputs: 2, ..NetworkConfig::default() };
+    let settings = TrainingConfig { epochs_max: 12, ..TrainingConfig::default() };
+    let trained = |held_out: &TrainingSet| run(config.clone(), (&training, Some(held_out)), &settings);
+    let ((one, of_one), (two, of_two)) = (trained(&beside), trained(&apart.unwrap()));
+    assert_eq!((one.weights(), of_one), (two.weights(), of_two));
+}
+
+#[test]
 fn a_warm_start_goes_on_where_training_ended() {
     let (training, held_out) = lag_sets(1);
     let config = NetworkConfig { inputs: 1, d_model: 8, ..NetworkConfig::default() };
