@@ -11,14 +11,66 @@ use crate::outcome::{GapBudget, GapStep};
 use crate::residual::Residual;
 use crate::state::{Nominal, State};
 
+/// Errors on the scored blocks with retuned tires, then with one effect after the other.
+#[derive(Debug, Clone)]
+pub(crate) struct Steps {
+    errors: Vec<Vec<(f64, f64)>>,
+    /// Those effects.
+    named: Vec<EffectId>,
+}
+
+impl Steps {
+    /// Scores retuned tires, the effects of `state` one after the other, and `state`.
+    pub(crate) fn of(
+        engine: &Engine<'_>,
+        scorer: &Scorer<'_>,
+        windows: &Split,
+        null: &State,
+        state: &State,
+    ) -> Self {
+        let mut errors = vec![scorer.blocks(&null.effects, None, &null.parameters)];
+        for count in 1..state.named.len() {
+            let named = &state.named[..count];
+            let values = engine.carry(state, named);
+            let step =
+                engine.fit(named, &values, Some(state.starts.clone()), &windows.training, STEP_ITERATIONS);
+            errors.push(scorer.blocks(&step.effects, None, &step.parameters));
+        }
+        if !state.named.is_empty() {
+            errors.push(scorer.blocks(&state.effects, None, &state.parameters));
+        }
+        Self { errors, named: state.named.clone() }
+    }
+
+    fn retuned(&self) -> &[(f64, f64)] {
+        &self.errors[0]
+    }
+
+    fn last(&self) -> &[(f64, f64)] {
+        &self.errors[self.errors.len() - 1]
+    }
+
+    /// What the effect taken as number `step`, from 1, closes after those before it.
+    fn closed(&self, step: usize) -> Estimate {
+        match (self.errors.get(step - 1), self.errors.get(step)) {
+            (Some(from), Some(to)) => closed(from, to, self.retuned()),
+            _ => Estimate::UNKNOWN,
+        }
+    }
+
+    /// The effect that makes the errors largest, if any makes them larger.
+    pub(crate) fn worst(&self) -> Option<EffectId> {
+        let shares = self.named.iter().enumerate().map(|(i, e)| (*e, self.closed(i + 1).value));
+        let larger = shares.filter(|(_, closed)| *closed < 0.0);
+        larger.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(effect, _)| effect)
+    }
+}
+
 /// Errors of the models on the scored blocks.
 #[derive(Debug, Clone)]
 pub(crate) struct Budget {
     pub(crate) nominal: Vec<(f64, f64)>,
-    /// Retuned tires, then with one effect after the other.
-    pub(crate) steps: Vec<Vec<(f64, f64)>>,
-    /// Those effects.
-    named: Vec<EffectId>,
+    steps: Steps,
     pub(crate) ceiling: Vec<(f64, f64)>,
     /// Retuned tires and a residual network; nothing where it could not be trained.
     residual: Option<Vec<(f64, f64)>>,
@@ -38,6 +90,8 @@ pub(crate) struct Models<'m> {
     pub(crate) null: &'m State,
     /// With the effects named.
     pub(crate) state: &'m State,
+    /// The errors of both, and between them.
+    pub(crate) steps: &'m Steps,
     /// The likeliest of the others, each with the parameters to begin with.
     pub(crate) candidates: &'m [(EffectId, Vec<f64>)],
 }
@@ -57,6 +111,15 @@ impl<'a> Scorer<'a> {
     /// Whether it scores on data that nothing is fitted to.
     pub(crate) fn is_apart(&self) -> bool {
         self.scored_on != TOO_LITTLE
+    }
+
+    /// Error of a model on each block.
+    fn blocks(&self, effects: &[EffectId], flexible: Option<&Flexible>, p: &[f64]) -> Vec<(f64, f64)> {
+        by_block(
+            self.engine.recording,
+            &self.windows,
+            &self.engine.score(effects, flexible, p, &self.windows),
+        )
     }
 
     pub(crate) fn new(engine: &Engine<'a>, other: Option<&'a Recording>, windows: &Split) -> Self {
@@ -91,26 +154,10 @@ const WIDEST_SHARE: f64 = 2.0;
 impl Budget {
     /// Scores the models.
     pub(crate) fn of(engine: &Engine<'_>, scorer: &Scorer<'_>, windows: &Split, models: &Models<'_>) -> Self {
-        let Models { nominal, null, state, candidates } = *models;
-        let Scorer { engine: scorer, windows: on, scored_on, .. } = scorer;
-        let blocks = |effects: &[EffectId], flexible: Option<&Flexible>, p: &[f64]| {
-            by_block(scorer.recording, on, &scorer.score(effects, flexible, p, on))
-        };
-        let retuned = blocks(&null.effects, None, &null.parameters);
-        let mut steps = vec![retuned.clone()];
-        for count in 1..state.named.len() {
-            let named = &state.named[..count];
-            let values = engine.carry(state, named);
-            let step =
-                engine.fit(named, &values, Some(state.starts.clone()), &windows.training, STEP_ITERATIONS);
-            steps.push(blocks(&step.effects, None, &step.parameters));
-        }
-        if !state.named.is_empty() {
-            steps.push(blocks(&state.effects, None, &state.parameters));
-        }
+        let Models { nominal, null, state, steps, candidates } = *models;
         let candidates = candidates
             .iter()
-            .filter_map(|(effect, own)| {
+            .map(|(effect, own)| {
                 let named = [&state.named[..], &[*effect]].concat();
                 let mut values = engine.carry(state, &named);
                 let from = values.len() - own.len();
@@ -122,8 +169,8 @@ impl Budget {
                     &windows.training,
                     STEP_ITERATIONS,
                 );
-                let error = blocks(&beside.effects, None, &beside.parameters);
-                Some((*effect, closed(steps.last()?, &error, &retuned)))
+                let error = scorer.blocks(&beside.effects, None, &beside.parameters);
+                (*effect, closed(steps.last(), &error, steps.retuned()))
             })
             .collect();
         let slip = large_slip_rad(engine, &windows.training);
@@ -133,41 +180,39 @@ impl Budget {
             || Residual::learned(engine, null, &windows.training),
         );
         let residual = residual.map(|residual| {
-            let model = ExtendedModel { residual: Some(&residual), ..scorer.model(&null.effects, None) };
-            by_block(scorer.recording, on, &scorer.score_model(&model, &null.parameters, on))
+            let Scorer { engine, windows, .. } = scorer;
+            let model = ExtendedModel { residual: Some(&residual), ..engine.model(&null.effects, None) };
+            by_block(engine.recording, windows, &engine.score_model(&model, &null.parameters, windows))
         });
-        let whole = match steps.last() {
-            Some(last) if steps.len() > 1 => closed(&retuned, last, &retuned),
-            _ => Estimate::default(),
+        let whole = if state.named.is_empty() {
+            Estimate::default()
+        } else {
+            closed(steps.retuned(), steps.last(), steps.retuned())
         };
         Self {
-            nominal: blocks(&nominal.effects, None, &nominal.parameters),
-            ceiling: blocks(&state.effects, Some(&flexible), &ceiling),
+            nominal: scorer.blocks(&nominal.effects, None, &nominal.parameters),
+            ceiling: scorer.blocks(&state.effects, Some(&flexible), &ceiling),
             residual,
-            steps,
-            named: state.named.clone(),
+            steps: steps.clone(),
             // By construction of the noise's figure the floor is 1.
             floor: Estimate { value: 1.0, low: 1.0, high: 1.0 },
             closed: whole,
-            scored_on,
+            scored_on: scorer.scored_on,
             candidates,
         }
     }
 
     pub(crate) fn retuned(&self) -> f64 {
-        self.steps.first().map_or(f64::NAN, |b| mean(b))
+        mean(self.steps.retuned())
     }
 
     pub(crate) fn after(&self) -> f64 {
-        self.steps.last().map_or(f64::NAN, |b| mean(b))
+        mean(self.steps.last())
     }
 
     /// What the effect taken as number `step`, from 1, closes after those before it.
     pub(crate) fn closed_by_step(&self, step: usize) -> Estimate {
-        match (self.steps.get(step - 1), self.steps.get(step), self.steps.first()) {
-            (Some(from), Some(to), Some(retuned)) => closed(from, to, retuned),
-            _ => Estimate::UNKNOWN,
-        }
+        self.steps.closed(step)
     }
 
     /// What an effect that was not named would close beside those that were.
@@ -184,12 +229,13 @@ impl Budget {
             .filter(|(c, _)| c.scored())
             .map(|(c, s)| (c.name(), *s))
             .collect();
-        let after = self.steps.last().map_or(Estimate::UNKNOWN, |b| interval(b));
+        let Steps { named, errors } = &self.steps;
+        let after = interval(self.steps.last());
         let ceiling = interval(&self.ceiling);
-        let steps = self.named.iter().zip(self.steps.iter().skip(1));
+        let steps = named.iter().zip(errors.iter().skip(1));
         GapBudget {
             nominal: interval(&self.nominal),
-            retuned: self.steps.first().map_or(Estimate::UNKNOWN, |b| interval(b)),
+            retuned: interval(self.steps.retuned()),
             steps: steps.map(|(e, blocks)| GapStep { effect: e.name(), error: interval(blocks) }).collect(),
             after,
             unstructured_ceiling: if ceiling.value > after.value { after } else { ceiling },
@@ -235,6 +281,20 @@ mod tests {
 
     fn blocks(means: &[f64]) -> Vec<(f64, f64)> {
         means.iter().map(|m| (100.0 * m, 100.0)).collect()
+    }
+
+    #[test]
+    fn what_makes_held_out_errors_larger_is_told_and_of_several_the_worst() {
+        let errors = |levels: &[f64]| {
+            levels.iter().map(|l| blocks(&[0.9 * l, 1.1 * l, *l, 1.05 * l, 0.95 * l, *l])).collect()
+        };
+        let of = |levels: &[f64]| Steps {
+            errors: errors(levels),
+            named: vec![EffectId::SteeringLag, EffectId::VyBias, EffectId::GyroScale],
+        };
+        assert_eq!(of(&[20.0, 9.0, 5.0, 4.9]).worst(), None);
+        assert_eq!(of(&[20.0, 9.0, 10.0, 4.0]).worst(), Some(EffectId::VyBias));
+        assert_eq!(of(&[20.0, 9.0, 10.0, 12.0]).worst(), Some(EffectId::GyroScale));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use gripsight_model::{EffectId, Flexible, HOLD, Need, Recording, Site};
 use gripsight_signals::{DataHealth, StateSequence};
 use gripsight_vehicle::{OWN_TIRE_PARAMETERS, OwnTires, PacejkaParameters, TirePosterior, VehicleParameters};
 
-use crate::budget::{Budget, CANDIDATES, Models, Scorer, large_slip_rad};
+use crate::budget::{Budget, CANDIDATES, Models, Scorer, Steps, large_slip_rad};
 use crate::engine::Engine;
 use crate::figures::figures;
 use crate::finding::{detection_limits, ranked, sites};
@@ -135,7 +135,7 @@ pub(crate) fn explain(
     // The inference works on a bounded number of windows, the final fit on all.
     let search_windows = windows.training.thinned(SEARCH_WINDOWS);
     let first = fitted_null(&engine, &search_windows)?;
-    let (inferred, differences) = match request.earlier {
+    let (mut inferred, mut differences) = match request.earlier {
         None => {
             let slip_rad = large_slip_rad(&engine, &search_windows);
             let wheelbase_m = request.vehicle.wheelbase_m();
@@ -152,32 +152,44 @@ pub(crate) fn explain(
         }
     };
     progress("fitting on all training blocks");
-    let (named, candidates) = match &differences {
-        Some((_, differences)) => (differences.accepted.clone(), differences.candidates()),
-        None => (inferred.accepted(), inferred.candidates()),
-    };
-    let size = |effect: EffectId| match &differences {
-        Some((earlier, differences)) => differences.size(earlier, effect).0,
-        None => inferred.size(effect).0,
-    };
     let null = engine.fit(&[], &first.parameters, None, &windows.training, FINAL_ITERATIONS);
-    let model = if named.is_empty() {
-        null.clone()
-    } else {
-        let mut values = engine.carry(&null, &named);
-        let own: Vec<f64> = named.iter().flat_map(|e| size(*e)).collect();
-        let from = values.len() - own.len();
-        values[from..].copy_from_slice(&own);
-        engine.fit(&named, &values, Some(null.starts.clone()), &windows.training, FINAL_ITERATIONS)
+    let scorer = Scorer::new(&engine, other.as_ref(), &windows);
+    // What rollouts of held-out data speak against is not named, and the rest fitted without it.
+    let (model, steps, candidates) = loop {
+        let (named, candidates) = match &differences {
+            Some((_, differences)) => (differences.accepted.clone(), differences.candidates()),
+            None => (inferred.accepted(), inferred.candidates()),
+        };
+        let size = |effect: &EffectId| match &differences {
+            Some((earlier, differences)) => differences.size(earlier, *effect).0,
+            None => inferred.size(*effect).0,
+        };
+        let model = if named.is_empty() {
+            null.clone()
+        } else {
+            let mut values = engine.carry(&null, &named);
+            let own: Vec<f64> = named.iter().flat_map(size).collect();
+            let from = values.len() - own.len();
+            values[from..].copy_from_slice(&own);
+            engine.fit(&named, &values, Some(null.starts.clone()), &windows.training, FINAL_ITERATIONS)
+        };
+        let steps = Steps::of(&engine, &scorer, &windows, &null, &model);
+        let Some(effect) = steps.worst() else {
+            let candidates: Vec<(EffectId, Vec<f64>)> =
+                candidates.into_iter().take(CANDIDATES).map(|e| (e, size(&e))).collect();
+            break (model, steps, candidates);
+        };
+        match &mut differences {
+            Some((_, differences)) => differences.refute(effect),
+            None => inferred.refute(effect),
+        }
     };
     progress("scoring on held-out data");
-    let scorer = Scorer::new(&engine, other.as_ref(), &windows);
-    let candidates: Vec<(EffectId, Vec<f64>)> =
-        candidates.into_iter().take(CANDIDATES).map(|e| (e, size(e))).collect();
-    let models = Models { nominal: &nominal, null: &null, state: &model, candidates: &candidates };
+    let models =
+        Models { nominal: &nominal, null: &null, state: &model, steps: &steps, candidates: &candidates };
     let budget = Budget::of(&engine, &scorer, &windows, &models);
     let (verdict, mut reasons) = match &differences {
-        Some((_, differences)) => (differences.verdict(), errors(&budget, named.is_empty())),
+        Some((_, differences)) => (differences.verdict(), errors(&budget, model.named.is_empty())),
         None => decide(&budget, &inferred, &library),
     };
     // What cannot be right comes right after the errors: it explains more than any effect.

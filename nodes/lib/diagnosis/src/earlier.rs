@@ -165,6 +165,11 @@ impl Differences {
         self.changes.iter().filter(|c| c.probability >= decisions::LIKELY && effect(c)).cloned().collect()
     }
 
+    /// Takes note that held-out data speak against a change.
+    pub(crate) fn refute(&mut self, effect: EffectId) {
+        self.accepted.retain(|e| *e != effect);
+    }
+
     /// An effect's parameters in the later drive, with standard deviations of what the earlier drive has and of the differences together.
     pub(crate) fn size(&self, earlier: &Earlier, effect: EffectId) -> Sized {
         let before = self.compared.earlier(&earlier.inferred, effect).unwrap_or_default();

@@ -120,6 +120,13 @@ impl Inferred {
         self.stated.as_ref()?.iter().find(|s| s.term == term)
     }
 
+    /// Takes note that held-out data speak against an effect.
+    pub(crate) fn refute(&mut self, effect: EffectId) {
+        let term = self.term_of(effect);
+        let stated = self.stated.iter_mut().flatten().filter(|s| Some(s.term) == term);
+        stated.for_each(|s| s.refuted = true);
+    }
+
     /// Whether the verdict names an effect: it, or another candidate that does nearly the same, is likely a cause, and not small beside what of the
     /// unexplained looks like it.
     pub(crate) fn is_accepted(&self, effect: EffectId) -> bool {

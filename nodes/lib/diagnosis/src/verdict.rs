@@ -44,6 +44,13 @@ pub(crate) fn decide(budget: &Budget, inferred: &Inferred, library: &[EffectId])
     }
     for effect in inferred.candidates() {
         let Some(statement) = inferred.statement(effect) else { continue };
+        if statement.refuted {
+            reasons.push(format!(
+                "{} makes the errors of rollouts on held-out data larger: it is no cause",
+                effect.name()
+            ));
+            continue;
+        }
         reasons.push(format!(
             "{} is a candidate (chance {:.2}): it closes {:.1} % of the held-out error that is left without it, its size is {:.1} half widths of its interval, and it explains {:.1} times what of the unexplained looks like it",
             effect.name(),
