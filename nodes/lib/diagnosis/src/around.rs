@@ -157,8 +157,7 @@ impl Around<'_, '_> {
                 start: (value + step[column]).clamp(low, high),
                 low,
                 high,
-                // Flexible terms are linear: their step is as good as a fit.
-                free: column < columns.first_flexible() && parameters.len() < MOST_FREE,
+                free: parameters.len() < MOST_FREE,
                 prior: Some(Prior {
                     mean: value + prior.offset,
                     sigma: prior.sigma[chosen[i]] / dispersion.sqrt(),

@@ -174,7 +174,7 @@ pub(crate) fn explain(
             engine.fit(&named, &values, Some(null.starts.clone()), &windows.training, FINAL_ITERATIONS)
         };
         let steps = Steps::of(&engine, &scorer, &windows, &null, &model);
-        let Some(effect) = steps.worst() else {
+        let Some(effect) = steps.refuted(&engine, &scorer, &windows, &model) else {
             let candidates: Vec<(EffectId, Vec<f64>)> =
                 candidates.into_iter().take(CANDIDATES).map(|e| (e, size(&e))).collect();
             break (model, steps, candidates);

@@ -91,7 +91,8 @@ impl Around<'_, '_> {
             }
         }
         let weeded = |start: Tried| {
-            let now = asked.with_likely_effects(asked.without_needless_free_terms(start))?;
+            let start = asked.with_effects_for_free_terms(asked.without_needless_free_terms(start));
+            let now = asked.with_likely_effects(start)?;
             // What stood in for the effects is no longer needed beside them.
             Some(asked.without_unlikely_effects(asked.without_needless_free_terms(now)))
         };
@@ -225,9 +226,34 @@ impl Asked<'_, '_, '_, '_> {
         }
     }
 
-    /// Effects that a model lacks and may need: those that the linearisation promises most of beside what it has, and those of which it asks for more
-    /// than any car has. How likely each is beside all others does not count: what stands in for an effect would keep it out.
-    fn offered(&self, now: &Tried, with: impl Fn(usize) -> Vec<usize> + Sync) -> Vec<usize> {
+    /// Puts an effect in the place of its site's free terms where it does as well: they do, roughly, what any cause there does.
+    fn with_effects_for_free_terms(&self, mut now: Tried) -> Tried {
+        for site in Site::ALL {
+            let free = self.free_terms(&now, site);
+            if free.is_empty() {
+                continue;
+            }
+            let swapped = |i: usize| {
+                let mut chosen = now.chosen.clone();
+                free.iter().for_each(|&t| chosen[t] = 0);
+                chosen[i] = 1;
+                chosen
+            };
+            let is_here = |i: usize| self.around.columns.effects[i - FIRST].spec().sites.contains(&site);
+            let mut promised = self.promised(&now, swapped);
+            promised.retain(|&i| is_here(i));
+            promised.truncate(FITTED);
+            let tried = promised.into_par_iter().filter_map(|i| self.fitted(swapped(i), now.place()));
+            let best = tried.min_by(|a, b| a.cost.total_cmp(&b.cost));
+            if let Some(best) = best.filter(|b| 1.0 - now.cost / b.cost < decisions::LEAST_CLOSED) {
+                now = best;
+            }
+        }
+        now
+    }
+
+    /// The effects that a model lacks, those first of which the linearisation promises most in a configuration with it.
+    fn promised(&self, now: &Tried, with: impl Fn(usize) -> Vec<usize> + Sync) -> Vec<usize> {
         let evidence = |chosen: &[usize]| {
             let around = self.around;
             configuration(&self.weighed.total, around.dispersion, around.terms, chosen)
@@ -236,9 +262,16 @@ impl Asked<'_, '_, '_, '_> {
         let mut promised: Vec<(usize, f64)> =
             self.effects(now, false).into_par_iter().filter_map(|i| Some((i, evidence(&with(i))?))).collect();
         promised.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let promising = promised.iter().take(LOOKED_AT).map(|p| p.0);
-        let at_most = promised.iter().skip(LOOKED_AT).map(|p| p.0).filter(|&i| self.is_at_its_most(now, i));
-        promising.chain(at_most).collect()
+        promised.into_iter().map(|p| p.0).collect()
+    }
+
+    /// Effects that a model lacks and may need: those that the linearisation promises most of beside what it has, and those of which it asks for more
+    /// than any car has. How likely each is beside all others does not count: what stands in for an effect would keep it out.
+    fn offered(&self, now: &Tried, with: impl Fn(usize) -> Vec<usize> + Sync) -> Vec<usize> {
+        let promised = self.promised(now, with);
+        let (promising, others) = promised.split_at(LOOKED_AT.min(promised.len()));
+        let at_most = others.iter().filter(|&&i| self.is_at_its_most(now, i));
+        promising.iter().chain(at_most).copied().collect()
     }
 
     /// Takes in the effects that all data make likelier than not, the likeliest first.

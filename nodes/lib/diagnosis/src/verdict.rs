@@ -1,6 +1,6 @@
 //! The verdict with its reasons, and what to drive or record next.
 
-use gripsight_estimation::mean;
+use gripsight_estimation::{interval, mean};
 use gripsight_model::{EffectId, Need, Site};
 
 use crate::budget::Budget;
@@ -64,7 +64,17 @@ pub(crate) fn decide(budget: &Budget, inferred: &Inferred, library: &[EffectId])
     let unnamed = |e: &EffectId| {
         inferred.statement(*e).is_some() && inferred.probability_of_alike(*e) >= decisions::NAMED
     };
-    let verdict = if !lacking.is_empty() || inferred.candidates().iter().any(unnamed) {
+    let left = interval(budget.steps.last());
+    let missing = left.low > decisions::SOUND_ERROR;
+    if missing {
+        reasons.push(format!(
+            "{:.1} times the noise is left, at least {:.1}, where drives without any effect leave {} at most: something is missing that no effect of the library does",
+            left.value,
+            left.low,
+            decisions::SOUND_ERROR
+        ));
+    }
+    let verdict = if missing || !lacking.is_empty() || inferred.candidates().iter().any(unnamed) {
         Verdict::NoneOfThese
     } else if mean(&budget.nominal) - budget.retuned() > RETUNE_EXCESS {
         Verdict::TireRetuneOnly
