@@ -88,6 +88,14 @@ fn an_effect_left_out_is_not_named_and_unknown_names_are_refused() {
 }
 
 #[test]
+fn what_neither_effects_nor_free_terms_explain_is_no_matter_of_other_tires() {
+    let recording = drive(&car(), &["gusts"], DURATION_S, 27).unwrap();
+    let d = diagnosed(&recording, &[]);
+    assert_eq!((d.verdict, named(&d)), (Verdict::NoneOfThese, Vec::new()), "{}", text(&d));
+    assert!(d.reasons.iter().any(|r| r.contains("times the noise is left")), "{}", text(&d));
+}
+
+#[test]
 fn data_that_cannot_tell_get_that_verdict_and_malformed_data_an_error() {
     let n = 2000;
     let series = |f: &dyn Fn(usize) -> f32| (0..n).map(f).collect::<Vec<f32>>();

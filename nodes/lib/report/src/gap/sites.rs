@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use gripsight_diagnosis::{Change, Diagnosis, EffectParameter, SiteAnswer};
+use gripsight_diagnosis::{Change, Diagnosis, EffectParameter, SiteAnswer, Verdict};
 use gripsight_model::EffectId;
 use maud::{Markup, html};
 
@@ -24,7 +24,12 @@ pub(super) fn lines(out: &mut String, d: &Diagnosis) {
         head = "";
     }
     if head == "sites" {
-        let _ = writeln!(out, "{head:<10} nothing is the matter at any of them, as far as these data tell");
+        let what = if d.verdict == Verdict::NoneOfThese {
+            "what is left fits none of them"
+        } else {
+            "nothing is the matter at any of them, as far as these data tell"
+        };
+        let _ = writeln!(out, "{head:<10} {what}");
     }
     let mut head = "changes";
     for change in d.changes.iter().take(CHANGES) {
