@@ -315,6 +315,44 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn the_force_follows_a_command_as_wheels_take_on_slip_and_an_acceleration_stands_for_itself() {
+        let vehicle = VehicleParameters::f1tenth();
+        let window = Window { segment: 0, from: 120, len: 12 };
+        let mut p = tires().to_parameters().to_vec();
+        p.push(0.0);
+        const JUMP: usize = 123;
+        // What a jump of the force by 1 m/s2 at a sample does to speed and acceleration. Wheels that spin up hold back on the way.
+        let answer = |has_command: bool, from: usize| {
+            let run = |more_mps2: f64| {
+                let mut recording = Recording { has_command, ..recording(4) };
+                let run = &mut recording.runs[0];
+                run.steering_rad.fill(0.0);
+                run.force_x_mps2[from..].iter_mut().for_each(|force| *force += more_mps2);
+                let out =
+                    ExtendedModel::new(&recording, &vehicle, &[], 0.0025).predict(&p, [0.0; 2], &window);
+                (out, crate::terms::slip_time_s(recording.runs[0].v_x_mps[JUMP]))
+            };
+            let ((plain, _), (out, lag_s)) = (run(0.0), run(1.0));
+            let less = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<f64>>();
+            (less(&out.a_x_mps2, &plain.a_x_mps2), less(&out.v_x_mps, &plain.v_x_mps), lag_s)
+        };
+        let (a_x_mps2, v_x_mps, lag_s) = answer(true, JUMP);
+        assert!(lag_s > 1e-3, "{lag_s}");
+        let dt_s = recording(4).runs[0].dt_s;
+        for (k, (a_x, v_x)) in a_x_mps2.iter().zip(&v_x_mps).enumerate() {
+            let since_s = (k as f64 - (JUMP - window.from) as f64).max(0.0) * dt_s;
+            let left = (-since_s / lag_s).exp();
+            approx::assert_abs_diff_eq!(*a_x, 1.0 - left, epsilon = 1e-4);
+            approx::assert_abs_diff_eq!(*v_x, since_s - lag_s * (1.0 - left), epsilon = 1e-4 * dt_s);
+        }
+        // Of a jump before the window it is told, too.
+        let (a_x_mps2, _, _) = answer(true, window.from - 1);
+        approx::assert_abs_diff_eq!(a_x_mps2[0], 1.0 - (-dt_s / lag_s).exp(), epsilon = 1e-4);
+        let (a_x_mps2, ..) = answer(false, JUMP);
+        assert!(a_x_mps2.iter().all(|a| *a == 0.0), "{a_x_mps2:?}");
+    }
+
+    #[test]
     fn what_pushes_along_the_road_turns_the_wheels_too_and_a_command_has_that_in_it() {
         const TURNED: f64 = 1.06;
         let vehicle = VehicleParameters::f1tenth();

@@ -5,6 +5,7 @@ use gripsight_signals::{Segment, StateSequence, segments};
 use crate::ModelError;
 use crate::smooth::{local_quadratic, median, quantile};
 use crate::station::{Laps, stations};
+use crate::terms::slip_time_s;
 
 /// A signal that the model predicts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -129,6 +130,20 @@ impl Run {
     pub fn steer(&mut self, effect: crate::EffectId, own: &[f64]) {
         effect.steer(own, &mut self.steering_rad, self.dt_s);
         effect.steer_held(own, &mut self.held_steering_rad, self.dt_s);
+    }
+
+    /// The step after sample `k` over the time in which the tires' longitudinal force follows its command; an acceleration that stands in for the force is
+    /// the force.
+    pub(crate) fn steps_of_force(&self, k: usize, has_command: bool) -> f64 {
+        const SHORTEST_S: f64 = 1e-6;
+        let lag_s = if has_command { slip_time_s(self.v_x_mps[k]) } else { 0.0 };
+        self.dt_s / lag_s.max(SHORTEST_S)
+    }
+
+    /// The tires' longitudinal force over the nominal mass a sample after `k`, from what it is there.
+    pub(crate) fn force_after_mps2(&self, force_mps2: f64, k: usize, has_command: bool) -> f64 {
+        let command = self.force_x_mps2[k];
+        command + (force_mps2 - command) * (-self.steps_of_force(k, has_command)).exp()
     }
 
     /// Time of sample `k` since the recording's first.
@@ -294,12 +309,18 @@ fn differs(a: &[f64], b: &[f64]) -> bool {
     apart > SHARE * fast
 }
 
-/// How far ahead of the command before it an acceleration stands that is measured at a sample, as a share of the way to the command after it: its
-/// stamps, and how it was interpolated, are not known. By least squares on what changes from sample to sample.
+/// How far ahead of the force at a sample an acceleration stands that is measured there, as a share of the way to the force at the next sample: its stamps,
+/// and how it was interpolated, are not known. By least squares on what changes from sample to sample.
 fn ahead(runs: &[Run], c: usize) -> f64 {
     let (mut product, mut square) = (0.0, 0.0);
     for run in runs {
-        for (force, measured) in run.force_x_mps2.windows(3).zip(run.measured[c][1..].windows(2)) {
+        let mut last = run.force_x_mps2[0];
+        let mut after = |k| {
+            last = run.force_after_mps2(last, k, true);
+            last
+        };
+        let force: Vec<f64> = (0..run.len()).map(&mut after).collect();
+        for (force, measured) in force.windows(3).zip(run.measured[c][1..].windows(2)) {
             let (late, early) = (force[1] - force[0], force[2] - force[1]);
             product += (early - late) * (measured[1] - measured[0] - late);
             square += (early - late).powi(2);
