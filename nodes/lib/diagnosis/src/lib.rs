@@ -10,8 +10,9 @@
 //!    hypotheses in one comparison, under one noise model. It gives the probability that each matters; the most probable model is fitted by
 //!    rollouts, everything is linearised anew around it, and what rollouts find needless goes.
 //! 4. Held-out data multiply the odds (`stated`): free terms that they do not need go, an effect takes the place of its site's where it does as well,
-//!    effects that they make likely come in, effects that they make unlikely go. What is left is named from a chance of being a cause on, which a fit on open development cases gives, unless it is small beside what
-//!    looks like it and no effect of the library does. Whatever the verdict, [`Diagnosis::sites`] says how likely something is the matter where.
+//!    effects that they make likely come in, effects that they make unlikely go. What is left is named from a chance of being a cause on, which a fit
+//!    on open development cases gives, unless it is small beside what looks like it and no effect of the library does. Whatever the verdict,
+//!    [`Diagnosis::sites`] says how likely something is the matter where.
 //! 5. Open-loop rollouts of 1 s on held-out blocks (or another bag): nominal, retuned, with the effects, with flexible terms on top (the
 //!    ceiling), with the residual network of `gripsight_s4` in place of effects, against the noise. What makes these errors larger beside the others is
 //!    not named. Where nothing is named and much more is left than in drives without any effect, something is missing that no effect does.
