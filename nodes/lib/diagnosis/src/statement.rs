@@ -18,7 +18,7 @@ pub(crate) struct Statement {
     pub(crate) closes: f64,
     /// What it explains over what of the unnamed looks like it; infinite where nothing unnamed is needed.
     pub(crate) over_unexplained: f64,
-    /// Whether rollouts of held-out data miss by more with it than without it.
+    /// Whether rollouts of held-out data surely miss by more with it than without it.
     pub(crate) refuted: bool,
 }
 

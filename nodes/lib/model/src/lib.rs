@@ -45,6 +45,7 @@ mod effects;
 mod error;
 mod flexible;
 mod identities;
+mod longitudinal_force;
 mod model;
 mod motion;
 pub mod noise;

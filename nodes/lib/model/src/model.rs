@@ -330,7 +330,7 @@ pub(crate) mod tests {
                 run.force_x_mps2[from..].iter_mut().for_each(|force| *force += more_mps2);
                 let out =
                     ExtendedModel::new(&recording, &vehicle, &[], 0.0025).predict(&p, [0.0; 2], &window);
-                (out, crate::terms::slip_time_s(recording.runs[0].v_x_mps[JUMP]))
+                (out, crate::longitudinal_force::slip_time_s(recording.runs[0].v_x_mps[JUMP]))
             };
             let ((plain, _), (out, lag_s)) = (run(0.0), run(1.0));
             let less = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<f64>>();

@@ -8,6 +8,7 @@ use gripsight_vehicle::{OwnTires, Real};
 
 use crate::effects::Lagging;
 use crate::flexible::Push;
+use crate::longitudinal_force::{Following, force_before_mps2};
 use crate::model::ExtendedModel;
 use crate::road_wheels::{RoadWheels, at_once};
 use crate::terms::{Axle, Axles, Car, Lag, Moment, Motion, Outputs, Sprung, TURNING_SHARE};
@@ -38,26 +39,6 @@ struct Extra<T> {
     /// Longitudinal acceleration as the springs carry it, at both ends.
     carried_a_x_mps2: [T; 2],
     force: Following,
-}
-
-/// How the tires' longitudinal force follows the command of a step, over the nominal mass.
-#[derive(Debug, Clone, Copy)]
-struct Following {
-    /// At both ends of the step, and at the end of the next.
-    at_sample_mps2: [f64; 3],
-    /// What is commanded in it.
-    command_mps2: f64,
-    /// The step over the time in which the force follows.
-    steps: f64,
-}
-
-impl Following {
-    /// Mean over a part of the step.
-    fn mean_mps2(&self, from: f64, to: f64) -> f64 {
-        let left = |share: f64| (-share * self.steps).exp();
-        let mean = (left(from) - left(to)) / ((to - from) * self.steps);
-        self.command_mps2 + (self.at_sample_mps2[0] - self.command_mps2) * mean
-    }
 }
 
 /// The inputs of an instant.
@@ -190,7 +171,7 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
     /// The car at the window's start.
     pub(crate) fn begin(&self, x: [T; 2], push: [T; 2]) -> Moving<T> {
         let zero = T::from(0.0);
-        let (pitch, force_mps2) = (self.pitch_before(), self.force_before_mps2());
+        let (pitch, force_mps2) = (self.pitch_before(), force_before_mps2(self.model.recording, self.window));
         let rates = self.settled(x, self.substeps().1, &self.extra(0, push, [pitch; 2], force_mps2));
         Moving { x, speed_mps: zero, heading_rad: zero, rates, pitch, force_mps2 }
     }
@@ -203,7 +184,7 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         let extra = self.extra(k, push, [from, to], state.force_mps2);
         let Moving { x, speed_mps, heading_rad, rates, pitch, force_mps2 } = state;
         *pitch = to;
-        *force_mps2 = extra.force.at_sample_mps2[1];
+        *force_mps2 = extra.force.end_mps2();
         for i in 0..substeps {
             let middle = self.instant(k, (i as f64 + 0.5) / substeps as f64, &extra);
             let half = [x[0] + rates.v_y_mps2 * (h_s / 2.0), x[1] + rates.yaw_radps2 * (h_s / 2.0)];
@@ -287,23 +268,6 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         self.pitch.map_or(pitch, |sprung| sprung.step(pitch, (a_x_mps2[k] + a_x_mps2[next]) / 2.0))
     }
 
-    /// The longitudinal force at the window's start, from what was commanded before it.
-    fn force_before_mps2(&self) -> f64 {
-        /// Of a time in which the force follows of 0.03 s, that of a car at 100 m/s.
-        const FORGOTTEN_S: f64 = 0.2;
-        let run = &self.model.recording.runs[self.window.segment];
-        let start = self.window.from;
-        let first = start - start.min((FORGOTTEN_S / run.dt_s).ceil() as usize);
-        let begin = run.force_x_mps2[first.saturating_sub(1)];
-        (first..start).fold(begin, |force, k| self.force_after_mps2(force, k))
-    }
-
-    /// The longitudinal force a sample after `k` of the recording.
-    fn force_after_mps2(&self, force_mps2: f64, k: usize) -> f64 {
-        let recording = self.model.recording;
-        recording.runs[self.window.segment].force_after_mps2(force_mps2, k, recording.has_command)
-    }
-
     fn extra(&self, k: usize, push: [T; 2], pitch: [[T; 2]; 2], force_mps2: f64) -> Extra<T> {
         let run = &self.model.recording.runs[self.window.segment];
         let flexible = self.model.flexible.as_ref();
@@ -312,16 +276,7 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
             push,
             flexible: flexible.map(|f| f.push(own(), run, self.window.from + k)),
             carried_a_x_mps2: pitch.map(|x| self.pitch.map_or(x[0], |sprung| sprung.carried(x))),
-            force: {
-                let at = self.window.from + k;
-                let last = run.len() - 1;
-                let end = self.force_after_mps2(force_mps2, at);
-                Following {
-                    at_sample_mps2: [force_mps2, end, self.force_after_mps2(end, (at + 1).min(last))],
-                    command_mps2: run.force_x_mps2[at],
-                    steps: run.steps_of_force(at, self.model.recording.has_command),
-                }
-            },
+            force: Following::of(self.model.recording, run, self.window.from + k, force_mps2),
         }
     }
 
@@ -346,24 +301,11 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
                 let [from, to] = extra.carried_a_x_mps2;
                 from + (to - from) * share
             },
-            force_x_mps2: self.force_x_mps2(&extra.force, share),
+            force_x_mps2: extra.force.at_mps2(share, self.substeps().0),
             minutes: (run.time_s(a) + share * run.dt_s) / 60.0,
             lap_share: lap[a] + (turn - turn.round()) * share,
             place_rad: run.place_rad[a],
             extra,
-        }
-    }
-
-    /// The longitudinal force `share` of a step after a sample: at a sample as far ahead as the acceleration is measured there, else its mean over the
-    /// substep around.
-    fn force_x_mps2(&self, force: &Following, share: f64) -> f64 {
-        let [start, end, next] = force.at_sample_mps2;
-        let ahead = |from: f64, to: f64| from + (to - from) * self.model.recording.force_ahead;
-        let half = 0.5 / self.substeps().0 as f64;
-        match share {
-            0.0 => ahead(start, end),
-            1.0 => ahead(end, next),
-            _ => force.mean_mps2((share - half).max(0.0), (share + half).min(1.0)),
         }
     }
 

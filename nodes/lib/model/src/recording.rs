@@ -5,7 +5,6 @@ use gripsight_signals::{Segment, StateSequence, segments};
 use crate::ModelError;
 use crate::smooth::{local_quadratic, median, quantile};
 use crate::station::{Laps, stations};
-use crate::terms::slip_time_s;
 
 /// A signal that the model predicts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -130,20 +129,6 @@ impl Run {
     pub fn steer(&mut self, effect: crate::EffectId, own: &[f64]) {
         effect.steer(own, &mut self.steering_rad, self.dt_s);
         effect.steer_held(own, &mut self.held_steering_rad, self.dt_s);
-    }
-
-    /// The step after sample `k` over the time in which the tires' longitudinal force follows its command; an acceleration that stands in for the force is
-    /// the force.
-    pub(crate) fn steps_of_force(&self, k: usize, has_command: bool) -> f64 {
-        const SHORTEST_S: f64 = 1e-6;
-        let lag_s = if has_command { slip_time_s(self.v_x_mps[k]) } else { 0.0 };
-        self.dt_s / lag_s.max(SHORTEST_S)
-    }
-
-    /// The tires' longitudinal force over the nominal mass a sample after `k`, from what it is there.
-    pub(crate) fn force_after_mps2(&self, force_mps2: f64, k: usize, has_command: bool) -> f64 {
-        let command = self.force_x_mps2[k];
-        command + (force_mps2 - command) * (-self.steps_of_force(k, has_command)).exp()
     }
 
     /// Time of sample `k` since the recording's first.

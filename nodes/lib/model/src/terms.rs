@@ -40,15 +40,6 @@ pub struct Car<T> {
 /// What the inertia of the turning wheels adds to the mass along the road, as a share of it. Wong, Theory of Ground Vehicles, section 3.1: 1.04 and more.
 pub(crate) const TURNING_SHARE: f64 = 0.06;
 
-/// Longitudinal stiffness of tires over their load, per unit of slip: 10 to 30 of most. Pacejka, Tire and Vehicle Dynamics, section 4.3.
-const SLIP_STIFFNESS: f64 = 20.0;
-
-/// Time in which wheels take on the slip that a force takes at a speed: what turns is the inertia of [`TURNING_SHARE`], what brakes it is the force that
-/// grows with the slip speed over the speed. Of the reference cars 2.4e-4 to 4.6e-4 s per m/s.
-pub(crate) fn slip_time_s(v_x_mps: f64) -> f64 {
-    TURNING_SHARE * v_x_mps / (SLIP_STIFFNESS * GRAVITY_MPS2)
-}
-
 /// Track over wheelbase: 0.55 of long road cars to 0.8 of formula and 1:10 cars.
 const TRACK_SHARE: f64 = 0.7;
 
