@@ -110,7 +110,7 @@ impl Around<'_, '_> {
         near: Option<(&[usize], &Refined)>,
     ) -> Option<Refined> {
         let step = configuration(problem, self.dispersion, self.terms, chosen)?.step;
-        let near = near.and_then(|near| self.from_near(near, problem, chosen, &step)).unwrap_or_default();
+        let near = near.and_then(|near| self.beginnings(near, problem, chosen, &step)).unwrap_or_default();
         self.refined(ITERATIONS_TO_THE_END, chosen, &step, near)
     }
 
@@ -126,7 +126,7 @@ impl Around<'_, '_> {
 
     /// Where the fit of a configuration begins that has `near`'s fit beside it: there, and with what tells the two apart by the linearisation; where an effect
     /// would stay as it is, at its starts.
-    fn from_near(
+    fn beginnings(
         &self,
         near: (&[usize], &Refined),
         problem: &Quadratic,
@@ -253,7 +253,7 @@ impl Around<'_, '_> {
         near: (&[usize], &Refined),
     ) -> Option<(f64, Refined)> {
         let step = configuration(problem, self.dispersion, self.terms, chosen)?.step;
-        self.by_chord_steps(problem, chosen, &self.from_near(near, problem, chosen, &step)?)
+        self.by_chord_steps(problem, chosen, &self.beginnings(near, problem, chosen, &step)?)
     }
 
     /// A configuration fitted roughly from the best of some places, by steps whose derivatives stay those of the linearisation (chord steps), so that each
