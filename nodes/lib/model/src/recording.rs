@@ -125,6 +125,19 @@ impl Run {
         if self.steering_is_held() { &self.held_steering_rad } else { &self.steering_rad }
     }
 
+    /// The command in force `ago_s` before sample `k`, of one that changes once in a step at most: where in a step it does, the step's mean tells.
+    pub(crate) fn command_rad(&self, k: usize, ago_s: f64) -> f64 {
+        /// How much later than it a command may come and still belong to a sample: stamps are rounded, fits are as exact as they are.
+        const SLACK_S: f64 = 3e-4;
+        let at = (k as f64 - (ago_s - SLACK_S) / self.dt_s).max(0.0);
+        let (from, share) = (at as usize, at.fract());
+        let last = self.len() - 1;
+        let [before, after] = [from, from + 1].map(|i| self.steering_rad[i.min(last)]);
+        let before_share = (after - self.held_steering_rad[from.min(last)]) / (after - before);
+        // A sample's own command is known.
+        if ago_s > 0.0 && share > before_share { after } else { before }
+    }
+
     /// Puts an effect with parameters `own` between the recorded steering and what it stands for.
     pub fn steer(&mut self, effect: crate::EffectId, own: &[f64]) {
         effect.steer(own, &mut self.steering_rad, self.dt_s);

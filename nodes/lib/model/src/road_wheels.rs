@@ -74,10 +74,18 @@ impl<T: Real> RoadWheels<T> {
         // An effect that is absent is in the way of nothing.
         let present = |(effect, own): &(EffectId, &[f64])| own[0] != effect.spec().parameters[0].null;
         let effects: Vec<_> = model.with_parameters(&p).filter(present).collect();
+        // What is handed on late and as it came jumps then.
+        let (late, others): (Vec<_>, Vec<_>) =
+            effects.into_iter().partition(|(effect, own)| effect.transport_s(own) > 0.0);
+        let transport_s: f64 = late.iter().map(|(effect, own)| effect.transport_s(own)).sum();
+        let course: Vec<f64> = self.course_rad.iter().map(Real::re).collect();
+        let course_rad = if late.is_empty() { course } else { delayed(&course, transport_s, run.dt_s) };
+        let handed_on = RoadWheels { course_rad, is_held: true, run_in: self.run_in, jumps_rad: Vec::new() };
         (0..window.len)
             .map(|k| {
-                let jump_rad = run.steering_rad[window.from + k] - self.at_sample_rad(self.run_in + k).re();
-                effects
+                let command_rad = run.command_rad(window.from + k, transport_s);
+                let jump_rad = command_rad - handed_on.at_sample_rad(self.run_in + k);
+                others
                     .iter()
                     .fold(jump_rad, |jump_rad, (effect, own)| seen(*effect, own, jump_rad, 0.5 * run.dt_s))
             })
@@ -258,7 +266,14 @@ mod tests {
         assert!(jumps(&held) > 0.005, "{}", jumps(&held));
         // Behind an actuator nothing is seen at once.
         assert!(jumps(&wheels(&[EffectId::SteeringLag], &[0.06, 0.25], 0.5 * run.dt_s)) < 1e-3);
-        assert_eq!(jumps(&wheels(&[EffectId::SteeringDelay], &[0.05], 0.5 * run.dt_s)), 0.0);
+        // What is handed on late jumps as it came.
+        let late = wheels(&[EffectId::SteeringDelay], &[0.043], 0.5 * run.dt_s);
+        for k in 0..WINDOW.len - 1 {
+            let command_rad = command_rad((WINDOW.from + k) as f64 * run.dt_s - 0.043 + 1e-9);
+            let seen_rad = late.angle_rad(k, 0.0) + late.jump_rad(k, 0.0);
+            approx::assert_relative_eq!(seen_rad, command_rad, epsilon = 1e-6);
+        }
+        assert!(jumps(&late) > 0.005, "{}", jumps(&late));
         // A course that moves on between samples is half a step earlier.
         let moving = wheels(&[], &[], 0.0);
         for k in 0..WINDOW.len - 1 {

@@ -104,6 +104,11 @@ pub trait Effect {
         Self::steer(p, steering_rad, dt_s);
     }
 
+    /// By how long it hands the steering on later, and otherwise as it came.
+    fn transport_s(_p: &[f64]) -> f64 {
+        0.0
+    }
+
     /// Changes constants of the car.
     fn car<T: Real>(_p: &[T], _car: &mut Car<T>) {}
 
@@ -162,6 +167,14 @@ macro_rules! library {
             pub fn steer_held<T: Real>(self, p: &[T], steering_rad: &mut [T], dt_s: f64) {
                 match self {
                     $(Self::$variant => <$effect>::steer_held(p, steering_rad, dt_s),)+
+                }
+            }
+
+            /// [`Effect::transport_s`] with its parameters `p`.
+            #[must_use]
+            pub fn transport_s(self, p: &[f64]) -> f64 {
+                match self {
+                    $(Self::$variant => <$effect>::transport_s(p),)+
                 }
             }
 

@@ -46,6 +46,10 @@ impl Effect for SteeringDelay {
         let late = delayed(steering_rad, p[0], dt_s);
         steering_rad.copy_from_slice(&late);
     }
+
+    fn transport_s(p: &[f64]) -> f64 {
+        p[0]
+    }
 }
 
 #[cfg(test)]
