@@ -255,6 +255,20 @@ fn every_verdict_has_its_sentence() {
 }
 
 #[test]
+fn what_would_close_most_and_is_not_named_stands_in_the_headline() {
+    let mut d = Diagnosis { verdict: Verdict::NoneOfThese, ..diagnosis() };
+    d.effects.iter_mut().for_each(|e| e.accepted = false);
+    d.effects[0].confidence = 0.56;
+    d.effects[0].gap_closed_fraction = estimate(0.7, 0.1);
+    let text = headline(&d);
+    assert!(text.contains("no effect of the library surely explains"), "{text}");
+    assert!(text.contains("steering delay (delay 0.0470 s) would close 70 %"), "{text}");
+    assert!(text.contains("a chance of 56 %"), "{text}");
+    d.effects[0].gap_closed_fraction = estimate(0.55, 0.1);
+    assert!(headline(&d).contains("no effect of the library explains"), "{}", headline(&d));
+}
+
+#[test]
 fn no_gap_is_said_only_where_little_is_left() {
     let mut d = Diagnosis { verdict: Verdict::NoGap, ..diagnosis() };
     (d.effects[0].confidence, d.effects[1].confidence) = (0.2, 0.34);

@@ -90,14 +90,22 @@ pub(super) fn sentence(d: &Diagnosis, before: Option<Before<'_>>) -> String {
             Some(has) => format!("Nothing {has} but for noise and the model's usual imperfection."),
             None => "No gap: model and car agree within the noise and the model's usual imperfection.".into(),
         },
-        Verdict::NoneOfThese => match &has {
-            Some(has) => format!(
-                "Something {has} that no effect of the library explains: with other tires {times} remains."
-            ),
-            None => format!(
-                "There is a gap that no effect of the library explains: with other tires {times} remains."
-            ),
-        },
+        Verdict::NoneOfThese => {
+            let what = match &has {
+                Some(has) => format!("Something {has}"),
+                None => "There is a gap".to_owned(),
+            };
+            let left = format!("with other tires {times} remains");
+            match would_close_most(d) {
+                None => format!("{what} that no effect of the library explains: {left}."),
+                Some(e) => format!(
+                    "{what} that no effect of the library surely explains: {left}; {} would close {} of it and is a cause with a chance of {}.",
+                    named(e),
+                    closes(&e.gap_closed_fraction),
+                    percent(e.confidence)
+                ),
+            }
+        }
         Verdict::NotIdentifiable => match d.reasons.first() {
             Some(reason) => format!("These data cannot tell: {reason}."),
             None => "These data cannot tell.".into(),
@@ -117,6 +125,13 @@ fn likeliest(d: &Diagnosis) -> String {
     let candidates = d.effects.iter().filter(|e| e.confidence >= WORTH_A_WORD);
     let first = candidates.max_by(|a, b| a.confidence.total_cmp(&b.confidence));
     first.map_or_else(String::new, |e| format!("; likeliest is {} ({})", named(e), percent(e.confidence)))
+}
+
+/// An effect that is not named and surely closes more than about half of the gap.
+fn would_close_most(d: &Diagnosis) -> Option<&RankedEffect> {
+    let candidates = d.effects.iter().filter(|e| !e.accepted && e.confidence >= WORTH_A_WORD);
+    let closing = candidates.filter(|e| e.gap_closed_fraction.low > MOST);
+    closing.max_by(|a, b| a.confidence.total_cmp(&b.confidence))
 }
 
 /// What the effects named close together.
