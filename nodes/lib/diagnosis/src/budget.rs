@@ -234,14 +234,11 @@ impl Budget {
         mean(self.steps.last())
     }
 
-    /// What the effect taken as number `step`, from 1, closes after those before it.
-    pub(crate) fn closed_by_step(&self, step: usize) -> Estimate {
-        self.steps.closed(step)
-    }
-
-    /// What an effect that was not named would close beside those that were.
-    pub(crate) fn closed_by_candidate(&self, effect: EffectId) -> Estimate {
-        self.candidates.iter().find(|c| c.0 == effect).map_or(Estimate::UNKNOWN, |c| c.1)
+    /// What an effect of the model closes after those before it, and another would close beside them.
+    pub(crate) fn closed_by(&self, effect: EffectId) -> Estimate {
+        let step = self.steps.named.iter().position(|e| *e == effect).map(|i| i + 1);
+        let candidate = || self.candidates.iter().find(|c| c.0 == effect).map_or(Estimate::UNKNOWN, |c| c.1);
+        step.map_or_else(candidate, |step| self.steps.closed(step))
     }
 
     /// As the result states it.

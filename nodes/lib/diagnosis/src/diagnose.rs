@@ -158,7 +158,7 @@ pub(crate) fn explain(
     let (model, steps, candidates) = loop {
         let (named, candidates) = match &differences {
             Some((_, differences)) => (differences.accepted.clone(), differences.candidates()),
-            None => (inferred.accepted(), inferred.candidates()),
+            None => (inferred.modelled(), inferred.candidates()),
         };
         let size = |effect: &EffectId| match &differences {
             Some((earlier, differences)) => differences.size(earlier, *effect).0,
@@ -175,8 +175,8 @@ pub(crate) fn explain(
         };
         let steps = Steps::of(&engine, &scorer, &windows, &null, &model);
         let Some(effect) = steps.refuted(&engine, &scorer, &windows, &model) else {
-            let candidates: Vec<(EffectId, Vec<f64>)> =
-                candidates.into_iter().take(CANDIDATES).map(|e| (e, size(&e))).collect();
+            let candidates = candidates.into_iter().filter(|e| !named.contains(e)).take(CANDIDATES);
+            let candidates: Vec<(EffectId, Vec<f64>)> = candidates.map(|e| (e, size(&e))).collect();
             break (model, steps, candidates);
         };
         match &mut differences {

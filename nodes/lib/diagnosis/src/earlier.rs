@@ -187,11 +187,11 @@ impl Differences {
         engine: &Engine<'_>,
         budget: &Budget,
     ) -> Vec<RankedEffect> {
-        let of = |effect: EffectId, closed| RankedEffect {
+        let of = |effect: EffectId| RankedEffect {
             name: effect.name(),
             accepted: self.accepted.contains(&effect),
             parameters: reported(engine, effect, &self.size(earlier, effect)),
-            gap_closed_fraction: closed,
+            gap_closed_fraction: budget.closed_by(effect),
             needed_fraction: f64::NAN,
             held_out_log_ratio: f64::NAN,
             over_unexplained: f64::NAN,
@@ -199,10 +199,7 @@ impl Differences {
             confidence: self.compared.of_effect(&earlier.inferred, effect),
             confused_with: Vec::new(),
         };
-        let mut out: Vec<RankedEffect> =
-            (self.accepted.iter().enumerate()).map(|(i, e)| of(*e, budget.closed_by_step(i + 1))).collect();
-        out.extend(self.candidates().into_iter().map(|e| of(e, budget.closed_by_candidate(e))));
-        out
+        self.accepted.iter().copied().chain(self.candidates()).map(of).collect()
     }
 
     /// The other effects that are worth a word, the likeliest first.

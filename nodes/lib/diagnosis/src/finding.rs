@@ -24,9 +24,18 @@ const ABSENT: f64 = 0.02;
 impl Inferred {
     /// The effects stated as causes, what closes most first.
     pub(crate) fn accepted(&self) -> Vec<EffectId> {
+        self.by_what_they_close(|e| self.is_accepted(e))
+    }
+
+    /// The effects of the model that errors are told of: those stated as causes, and beside them what stands in for others. What closes most first.
+    pub(crate) fn modelled(&self) -> Vec<EffectId> {
+        let any = self.columns.effects.iter().any(|e| self.is_accepted(*e));
+        self.by_what_they_close(|e| self.is_accepted(e) || any && self.stands_in(e))
+    }
+
+    fn by_what_they_close(&self, belongs: impl Fn(EffectId) -> bool) -> Vec<EffectId> {
         let closes = |e: &EffectId| self.statement(*e).map_or(0.0, |s| s.closes);
-        let mut out: Vec<EffectId> =
-            self.columns.effects.iter().copied().filter(|e| self.is_accepted(*e)).collect();
+        let mut out: Vec<EffectId> = self.columns.effects.iter().copied().filter(|e| belongs(*e)).collect();
         out.sort_by(|a, b| closes(b).total_cmp(&closes(a)));
         out
     }
@@ -49,11 +58,11 @@ pub(crate) fn ranked(
     library: &[EffectId],
     budget: &Budget,
 ) -> Vec<RankedEffect> {
-    let of = |effect: EffectId, accepted: bool, closed: Estimate| RankedEffect {
+    let of = |effect: EffectId, accepted: bool| RankedEffect {
         name: effect.name(),
         accepted,
         parameters: reported(engine, effect, &inferred.size(effect)),
-        gap_closed_fraction: closed,
+        gap_closed_fraction: budget.closed_by(effect),
         needed_fraction: inferred.statement(effect).map_or(f64::NAN, |s| s.closes),
         held_out_log_ratio: inferred.statement(effect).map_or(f64::NAN, |s| s.held_out_log_ratio),
         over_unexplained: inferred.statement(effect).map_or(f64::NAN, |s| s.over_unexplained),
@@ -61,10 +70,8 @@ pub(crate) fn ranked(
         confidence: inferred.probability(effect),
         confused_with: confused(inferred, library, effect).iter().map(|e| e.name()).collect(),
     };
-    let stated = inferred.accepted().into_iter().enumerate();
-    let mut out: Vec<RankedEffect> = stated.map(|(i, e)| of(e, true, budget.closed_by_step(i + 1))).collect();
-    out.extend(inferred.candidates().into_iter().map(|e| of(e, false, budget.closed_by_candidate(e))));
-    out
+    let accepted = inferred.accepted().into_iter().map(|e| of(e, true));
+    accepted.chain(inferred.candidates().into_iter().map(|e| of(e, false))).collect()
 }
 
 /// Sizes from which effects would show beside the most probable model: five standard deviations.
@@ -136,7 +143,7 @@ pub(crate) fn untried(effect: EffectId, library: &[EffectId]) -> impl Iterator<I
 
 /// The graded answer: how likely each site is at fault, what it closes, and which mechanisms there.
 pub(crate) fn sites(inferred: &Inferred, effects: &[RankedEffect]) -> Vec<SiteAnswer> {
-    let shares = Shares::of(inferred);
+    let (shares, modelled) = (Shares::of(inferred), inferred.modelled());
     let mut out: Vec<SiteAnswer> = Site::ALL
         .into_iter()
         .map(|site| {
@@ -168,7 +175,8 @@ pub(crate) fn sites(inferred: &Inferred, effects: &[RankedEffect]) -> Vec<SiteAn
             } else {
                 0.0
             };
-            let named = here.iter().filter_map(|e| effects.iter().find(|r| r.name == e.name() && r.accepted));
+            let modelled = modelled.iter().filter(|e| here.contains(e));
+            let named = modelled.filter_map(|e| effects.iter().find(|r| r.name == e.name()));
             let shares: Vec<Estimate> =
                 named.map(|e| e.gap_closed_fraction).filter(|c| c.value.is_finite()).collect();
             let sum = |of: fn(&Estimate) -> f64| shares.iter().map(of).sum();

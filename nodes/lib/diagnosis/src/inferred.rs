@@ -137,6 +137,15 @@ impl Inferred {
         self.statement(effect).is_some_and(holds)
     }
 
+    /// Whether an effect is not named and stays in the model beside what is: it, or what does nearly the same and is not among the candidates, is likely a
+    /// cause, and the others would make up for it.
+    pub(crate) fn stands_in(&self, effect: EffectId) -> bool {
+        let holds = |s: &Statement| {
+            s.chance_of_alike() >= decisions::NAMED && s.over_unexplained >= decisions::LEAST_OVER_UNEXPLAINED
+        };
+        !self.is_accepted(effect) && self.statement(effect).is_some_and(holds)
+    }
+
     /// The terms with each effect that does not matter, but for what every car has, and each flexible term that is not needed gone for good: the narrow
     /// prior alone lets large evidence keep them, and what they keep would be missing in what a site closes.
     pub(crate) fn absent_terms(&self) -> Vec<Term> {

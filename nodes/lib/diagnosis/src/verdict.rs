@@ -23,11 +23,16 @@ pub(crate) fn decide(budget: &Budget, inferred: &Inferred, library: &[EffectId])
     let mut reasons = errors(budget, inferred.accepted().is_empty());
     let named = inferred.accepted();
     let lacking = lacking(inferred);
-    for effect in &named {
-        let others: Vec<&str> = untried(*effect, library).map(EffectId::name).collect();
+    for effect in inferred.modelled() {
+        let others: Vec<&str> = untried(effect, library).map(EffectId::name).collect();
+        let how = if named.contains(&effect) {
+            "shares its name with"
+        } else {
+            "stands in the model for itself or"
+        };
         if !others.is_empty() {
             reasons.push(format!(
-                "{} shares its name with {}, which does nearly the same and was not among the candidates",
+                "{} {how} {}, which does nearly the same and was not among the candidates",
                 effect.name(),
                 others.join(" and ")
             ));
