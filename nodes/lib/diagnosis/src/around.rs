@@ -1,7 +1,7 @@
 //! Configurations fitted by rollouts, and freed of what rollouts find needless.
 
 use gripsight_estimation::Windows;
-use gripsight_estimation::selection::{Configuration, Quadratic, Selection, Term, configuration};
+use gripsight_estimation::selection::{Quadratic, Selection, Term, configuration};
 use gripsight_estimation::shooting::{self, Parameter, Prior, Problem};
 use gripsight_model::{BASE, EffectId, ExtendedModel, Site};
 use nalgebra::{DMatrix, DVector};
@@ -99,7 +99,7 @@ impl Around<'_, '_> {
     /// A configuration fitted by rollouts, between two linearisations.
     pub(crate) fn by_rollouts(&self, problem: &Quadratic, chosen: &[usize]) -> Option<Refined> {
         let linear = configuration(problem, self.dispersion, self.terms, chosen)?;
-        self.refined(ITERATIONS, chosen, &linear.step, None)
+        self.refined(ITERATIONS, chosen, &linear.step, Vec::new())
     }
 
     /// The same, as far as it goes. `near`: another one that is fitted, and which one; what tells them apart is added by the linearisation.
@@ -109,34 +109,73 @@ impl Around<'_, '_> {
         chosen: &[usize],
         near: Option<(&[usize], &Refined)>,
     ) -> Option<Refined> {
-        let linear = |chosen: &[usize]| {
-            configuration(problem, self.dispersion, self.terms, chosen).map(|found| found.step)
-        };
-        let step = linear(chosen)?;
-        let near = near.and_then(|(other, fitted)| {
-            let (apart, has) = (&step - linear(other)?, self.in_use(other));
-            // Of an effect that is absent here the linearisation tells the size alone: what shapes it stays.
-            let shapes = |e: &EffectId| self.columns.of_effect(*e).map(|r| r.start + e.sizing()..r.end);
-            let shaping: Vec<usize> = self.columns.effects.iter().filter_map(shapes).flatten().collect();
-            let at = |c: usize| match (has[c], shaping.contains(&c)) {
-                (true, _) => fitted.values[c] + apart[c],
-                (false, true) => self.values[c],
-                (false, false) => self.values[c] + step[c],
-            };
-            let values = (0..self.values.len()).map(at).collect();
-            Some(Refined { values, starts: fitted.starts.clone() })
-        });
+        let step = configuration(problem, self.dispersion, self.terms, chosen)?.step;
+        let near = near.and_then(|near| self.beginnings(near, problem, chosen, &step)).unwrap_or_default();
         self.refined(ITERATIONS_TO_THE_END, chosen, &step, near)
     }
 
-    /// The model of a configuration fitted by rollouts, from where the linear step leads, where the linearisation is, or `near`, whichever is best. Terms
+    /// The effect of a configuration that is absent in a model, and whose derivative vanishes there: no fit leads away from where it is absent.
+    fn stuck(&self, chosen: &[usize], values: &[f64]) -> Option<EffectId> {
+        let mut effects = self.columns.effects.iter().zip(&chosen[FIRST..]);
+        let absent = |e: EffectId| {
+            let column = self.columns.of_effect(e).map_or(0, |r| r.start);
+            (values[column] - e.spec().parameters[0].null).abs() < 1e-12
+        };
+        effects.find(|(e, c)| **c > 0 && e.spec().flat_at_null && absent(**e)).map(|(e, _)| *e)
+    }
+
+    /// Where the fit of a configuration begins that has `near`'s fit beside it: there, and with what tells the two apart by the linearisation; where an effect
+    /// would stay as it is, at its starts.
+    fn beginnings(
+        &self,
+        near: (&[usize], &Refined),
+        problem: &Quadratic,
+        chosen: &[usize],
+        step: &DVector<f64>,
+    ) -> Option<Vec<Refined>> {
+        let apart = self.apart_from(near, problem, step)?;
+        let fitted = near.1.clone();
+        let Some(effect) = self.stuck(chosen, &fitted.values) else { return Some(vec![apart, fitted]) };
+        let range = self.columns.of_effect(effect)?;
+        let size = &effect.spec().parameters[0];
+        let started = |multiple: &f64| {
+            let mut begin = fitted.clone();
+            begin.values[range.clone()].copy_from_slice(&self.values[range.clone()]);
+            begin.values[range.start] = size.null + multiple * self.engine.size(size);
+            begin
+        };
+        Some(effect.spec().starts.iter().map(started).chain([apart]).collect())
+    }
+
+    /// Where another configuration's fit leads, with what tells the two apart by the linearisation; `step`: the linear answer of this one.
+    fn apart_from(
+        &self,
+        (other, fitted): (&[usize], &Refined),
+        problem: &Quadratic,
+        step: &DVector<f64>,
+    ) -> Option<Refined> {
+        let its = configuration(problem, self.dispersion, self.terms, other)?.step;
+        let (apart, has) = (step - its, self.in_use(other));
+        // Of an effect that is absent there the linearisation tells the size alone: what shapes it stays.
+        let shapes = |e: &EffectId| self.columns.of_effect(*e).map(|r| r.start + e.sizing()..r.end);
+        let shaping: Vec<usize> = self.columns.effects.iter().filter_map(shapes).flatten().collect();
+        let at = |c: usize| match (has[c], shaping.contains(&c)) {
+            (true, _) => fitted.values[c] + apart[c],
+            (false, true) => self.values[c],
+            (false, false) => self.values[c] + step[c],
+        };
+        let values = (0..self.values.len()).map(at).collect();
+        Some(Refined { values, starts: fitted.starts.clone() })
+    }
+
+    /// The model of a configuration fitted by rollouts, from where the linear step leads, where the linearisation is, or one of `near`, whichever is best. Terms
     /// that it has only as little of as any car are absent there, but for those that every car has.
     fn refined(
         &self,
         iterations: usize,
         chosen: &[usize],
         step: &DVector<f64>,
-        near: Option<Refined>,
+        near: Vec<Refined>,
     ) -> Option<Refined> {
         let Self { engine, columns, terms, values, starts, windows, dispersion, .. } = *self;
         let in_use = self.in_use(chosen);
@@ -169,10 +208,11 @@ impl Around<'_, '_> {
             starts: starts.to_vec(),
         };
         let here = Refined { values: values.to_vec(), starts: starts.to_vec() };
-        let (cost, begin) = [linear, here]
+        let ((_, cost), begin) = [linear, here]
             .into_iter()
             .chain(near)
             .map(|begin| {
+                let stuck = self.stuck(chosen, &begin.values).is_some();
                 let at: Vec<f64> = parameters
                     .iter()
                     .zip(&map)
@@ -180,9 +220,9 @@ impl Around<'_, '_> {
                     .collect();
                 let problem = engine.problem(&model, &windows.windows, &parameters, 0);
                 let cost = shooting::evaluate(&problem, &at, &begin.starts).cost;
-                (cost, (at, begin.starts))
+                ((stuck, cost), (at, begin.starts))
             })
-            .min_by(|a, b| a.0.total_cmp(&b.0))?;
+            .min_by(|a, b| a.0.0.cmp(&b.0.0).then(a.0.1.total_cmp(&b.0.1)))?;
         let (at, begin) = begin;
         parameters.iter_mut().zip(at).for_each(|(p, at)| p.start = at);
         let problem = Problem {
@@ -196,11 +236,35 @@ impl Around<'_, '_> {
         best.at.cost.is_finite().then_some(Refined { values: target, starts: best.starts })
     }
 
-    /// A configuration fitted near the linearisation, for a look, with the logarithm of its evidence by rollouts, its prior weight counted: by steps whose
-    /// derivatives stay those of the linearisation (chord steps), so that each costs one plain rollout.
+    /// A configuration fitted roughly, for a look, from the linear answer, with the logarithm of its evidence by rollouts, its prior weight counted.
     pub(crate) fn nearby(&self, problem: &Quadratic, chosen: &[usize]) -> Option<(f64, Refined)> {
-        let Configuration { step, log_occam, .. } =
-            configuration(problem, self.dispersion, self.terms, chosen)?;
+        let step = configuration(problem, self.dispersion, self.terms, chosen)?.step;
+        let answer = self.values.iter().zip(step.iter()).map(|(v, s)| v + s).collect();
+        let here = |values| Refined { values, starts: self.starts.to_vec() };
+        // Where the linear answer leads nowhere: from where it began.
+        self.by_chord_steps(problem, chosen, &[here(answer), here(self.values.to_vec())])
+    }
+
+    /// The same from another configuration's fit.
+    pub(crate) fn beside(
+        &self,
+        problem: &Quadratic,
+        chosen: &[usize],
+        near: (&[usize], &Refined),
+    ) -> Option<(f64, Refined)> {
+        let step = configuration(problem, self.dispersion, self.terms, chosen)?.step;
+        self.by_chord_steps(problem, chosen, &self.beginnings(near, problem, chosen, &step)?)
+    }
+
+    /// A configuration fitted roughly from the best of some places, by steps whose derivatives stay those of the linearisation (chord steps), so that each
+    /// costs one plain rollout.
+    fn by_chord_steps(
+        &self,
+        problem: &Quadratic,
+        chosen: &[usize],
+        begins: &[Refined],
+    ) -> Option<(f64, Refined)> {
+        let log_occam = configuration(problem, self.dispersion, self.terms, chosen)?.log_occam;
         let columns = self.columns;
         let in_use = self.in_use(chosen);
         let free: Vec<Free> = self
@@ -244,19 +308,17 @@ impl Around<'_, '_> {
         let shifted = |starts: &[[f64; 2]], by: &[[f64; 2]]| -> Vec<[f64; 2]> {
             starts.iter().zip(by).map(|(x, d)| [x[0] + d[0], x[1] + d[1]]).collect()
         };
-        // Where the linear answer leads nowhere: from where it began.
-        let mut begin = columns.blank(self.engine);
-        (0..begin.len()).filter(|&c| in_use[c]).for_each(|c| begin[c] = self.values[c]);
-        let linear = DVector::from_iterator(free.len(), free.iter().map(|f| step[f.column]));
-        let mut starts = self.starts.to_vec();
-        let mut values = moved(&begin, &linear, 1.0);
-        let (mut cost, mut trial) = match at(&values, &starts) {
-            Some(found) => found,
-            None => {
-                values = moved(&begin, &linear, 0.0);
-                at(&values, &starts)?
-            }
+        let within = |from: &[f64]| -> Vec<f64> {
+            let mut out = columns.blank(self.engine);
+            (0..out.len()).filter(|&c| in_use[c]).for_each(|c| out[c] = self.values[c]);
+            free.iter().for_each(|f| out[f.column] = from[f.column].clamp(f.bounds[0], f.bounds[1]));
+            out
         };
+        let tried = begins.iter().filter_map(|begin| {
+            let values = within(&begin.values);
+            at(&values, &begin.starts).map(|(cost, trial)| (cost, trial, values, begin.starts.clone()))
+        });
+        let (mut cost, mut trial, mut values, mut starts) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
         for _ in 0..STEPS {
             starts = shifted(&starts, &trial.shifts);
             let pull = DVector::from_fn(free.len(), |i, _| {
@@ -377,5 +439,90 @@ impl Around<'_, '_> {
         }
         let fitted = self.by_rollouts(problem, &chosen)?;
         Some(Pruned { chosen, fitted, losses: out })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gripsight_estimation::split;
+    use gripsight_model::Flexible;
+    use gripsight_vehicle::VehicleParameters;
+
+    use super::*;
+    use crate::hypotheses::terms;
+    use crate::testing::{drive, tires};
+    use crate::trust::TireTrust;
+
+    fn with_around<T>(lag_s: f64, far: f64, then: impl FnOnce(&Around<'_, '_>, &Quadratic) -> T) -> T {
+        let vehicle = VehicleParameters::f1tenth();
+        let recording = drive(&vehicle, lag_s);
+        let engine = Engine::new(&recording, &vehicle, tires(), TireTrust::file());
+        let windows = split(&recording, true).training;
+        let null = engine.fit(&[], &engine.blank(), None, &windows, 15);
+        let mut library: Vec<EffectId> = EffectId::background().collect();
+        library.extend([EffectId::SteeringLag, EffectId::SteeringRateLimit, EffectId::VyBias]);
+        let flexible = Flexible::new(&recording, 0.1, vehicle.wheelbase_m(), &Site::ALL);
+        let columns = Columns::new(library.clone(), flexible);
+        let mut values = columns.blank(&engine);
+        values[..BASE].copy_from_slice(&null.parameters[..BASE]);
+        values[0] *= far;
+        let joint = Joint::around(&engine, &columns, &values, &null.starts, &windows).unwrap();
+        let scale = vec![1.0; recording.channels.len()];
+        let problem = joint.weighed(&scale).total;
+        let terms = terms(&engine, &columns, &values, &library);
+        let around = Around {
+            engine: &engine,
+            columns: &columns,
+            terms: &terms,
+            values: &values,
+            starts: &null.starts,
+            windows: &windows,
+            dispersion: 1.0,
+            joint: &joint,
+            scale: &scale,
+        };
+        then(&around, &problem)
+    }
+
+    fn configured(around: &Around<'_, '_>, effects: &[EffectId]) -> Vec<usize> {
+        let mut chosen = vec![0; around.terms.len()];
+        for effect in effects {
+            chosen[FIRST + around.columns.effects.iter().position(|e| e == effect).unwrap()] = 1;
+        }
+        chosen
+    }
+
+    #[test]
+    fn a_look_beside_a_fit_is_as_good_as_the_fit_wherever_the_linearisation_is() {
+        const LAG_S: f64 = 0.06;
+        const FAR: f64 = 0.3;
+        with_around(LAG_S, FAR, |around, problem| {
+            let with_lag = configured(around, &[EffectId::SteeringLag]);
+            let fit = around.by_rollouts_to_the_end(problem, &with_lag, None).unwrap();
+            let lag = around.columns.of_effect(EffectId::SteeringLag).unwrap().start;
+            assert!((fit.values[lag] - LAG_S).abs() < 0.005, "{}", fit.values[lag]);
+            let fuller = configured(around, &[EffectId::SteeringLag, EffectId::VyBias]);
+            let (from_afar, _) = around.nearby(problem, &fuller).unwrap();
+            let (beside, look) = around.beside(problem, &fuller, (&with_lag, &fit)).unwrap();
+            let (itself, _) = around.beside(problem, &with_lag, (&with_lag, &fit)).unwrap();
+            assert!(beside > from_afar + CLEAR, "{beside} {from_afar}");
+            // One parameter more costs its prior weight, and the rest is as good as the fit.
+            assert!((beside - itself).abs() < DOUBTFUL, "{beside} {itself}");
+            assert!((look.values[lag] - LAG_S).abs() < 0.005, "{}", look.values[lag]);
+        });
+    }
+
+    #[test]
+    fn a_fit_leads_away_from_where_an_effect_is_absent_and_its_derivative_vanishes() {
+        const LAG_S: f64 = 0.06;
+        with_around(LAG_S, 1.0, |around, problem| {
+            let [nothing, with_limit] =
+                [&[][..], &[EffectId::SteeringRateLimit]].map(|e| configured(around, e));
+            let fit = around.by_rollouts_to_the_end(problem, &nothing, None).unwrap();
+            assert_eq!(around.stuck(&with_limit, &fit.values), Some(EffectId::SteeringRateLimit));
+            let limited =
+                around.by_rollouts_to_the_end(problem, &with_limit, Some((&nothing, &fit))).unwrap();
+            assert_eq!(around.stuck(&with_limit, &limited.values), None);
+        });
     }
 }

@@ -34,6 +34,8 @@ pub(crate) const FIRST: usize = 2;
 const ROUNDS: usize = 7;
 /// Rounds at most in which effects alone are compared: beside free terms a linearisation far from the cause would blame them.
 const CLOSED_ROUNDS: usize = 4;
+/// Linearisations at most around what data that nothing was fitted to leave.
+const AGAIN: usize = 3;
 /// Rounds after which the noise stays.
 const NOISE_ROUNDS: usize = 2;
 
@@ -124,9 +126,18 @@ pub(crate) fn infer(
         if (same && open_flexible && rounds > NOISE_ROUNDS) || last {
             let confirmed = around.confirmed(&weighed.total, &selection, &losses)?;
             progress("asking data that nothing was fitted to");
-            let Stated { chosen: best, fitted, statements: mut stated } =
-                around.stated(&weighed, (best, fitted), closed, scorer)?;
-            let sizes = Sizes::of(&around, library, &best, &fitted, windows)?;
+            let mut found = around.stated(&weighed, (best, fitted), closed, scorer)?;
+            let mut sizes = Sizes::of(&around, library, &found.chosen, &found.fitted, windows)?;
+            // What is left is another model than the one that everything was linearised around.
+            let mut linearised = chosen;
+            for _ in 0..AGAIN {
+                if linearised.as_ref() == Some(&found.chosen) {
+                    break;
+                }
+                linearised = Some(found.chosen.clone());
+                (found, sizes) = again(engine, &columns, library, windows, dispersion, scorer, found)?;
+            }
+            let Stated { chosen: best, statements: mut stated, .. } = found;
             for statement in &mut stated {
                 let effect = columns.effects[statement.term - FIRST];
                 statement.untried = untried(effect, library).count();
@@ -156,6 +167,38 @@ pub(crate) fn infer(
         (values, starts) = (fitted.values, fitted.starts);
         chosen = Some(best);
     }
+}
+
+/// Linearises everything around a model that was found, and asks data that nothing was fitted to once more.
+fn again(
+    engine: &Engine<'_>,
+    columns: &Columns,
+    library: &[EffectId],
+    windows: &Windows,
+    dispersion: f64,
+    scorer: &Scorer<'_>,
+    Stated { chosen, fitted, .. }: Stated,
+) -> Option<(Stated, Sizes)> {
+    let (mut values, starts) = (fitted.values.clone(), &fitted.starts);
+    let mut joint = Joint::around(engine, columns, &values, starts, windows)?;
+    differences(engine, columns, &mut values, starts, windows, &mut joint);
+    let terms = terms(engine, columns, &values, library);
+    let scale = vec![1.0; engine.sigma.len()];
+    let weighed = joint.weighed(&scale);
+    let around = Around {
+        engine,
+        columns,
+        terms: &terms,
+        values: &values,
+        starts,
+        windows,
+        dispersion,
+        joint: &joint,
+        scale: &scale,
+    };
+    let found = around.stated(&weighed, (chosen, fitted.clone()), None, scorer)?;
+    let sizes = Sizes::of(&around, library, &found.chosen, &found.fitted, windows)?;
+    Some((found, sizes))
 }
 
 /// Linearises another drive in the same columns: at given values, or around the best fit to it of a configuration from there on. The engine's channel
@@ -317,18 +360,22 @@ mod tests {
     use gripsight_vehicle::VehicleParameters;
 
     use super::*;
+    use crate::around::Refined;
+    use crate::statement::Statement;
     use crate::testing::{drive, tires};
     use crate::trust::TireTrust;
 
+    const LARGE_SLIP_RAD: f64 = 0.1;
+    const LIBRARY: [EffectId; 4] =
+        [EffectId::SteeringLag, EffectId::SteeringDelay, EffectId::VyBias, EffectId::GyroScale];
+
     fn inferred(lag_s: f64, without: &[EffectId]) -> Inferred {
-        const LARGE_SLIP_RAD: f64 = 0.1;
         let vehicle = VehicleParameters::f1tenth();
         let recording = drive(&vehicle, lag_s);
         let mut engine = Engine::new(&recording, &vehicle, tires(), TireTrust::file());
         let windows = split(&recording, true).training;
         let null = engine.fit(&[], &engine.blank(), None, &windows, 15);
-        let library = [EffectId::SteeringLag, EffectId::SteeringDelay, EffectId::VyBias, EffectId::GyroScale];
-        let library: Vec<EffectId> = library.into_iter().filter(|e| !without.contains(e)).collect();
+        let library: Vec<EffectId> = LIBRARY.into_iter().filter(|e| !without.contains(e)).collect();
         let flexible = Flexible::new(&recording, LARGE_SLIP_RAD, vehicle.wheelbase_m(), &Site::ALL);
         let both = split(&recording, true);
         let scorer = Scorer::new(&engine.clone(), None, &both);
@@ -353,5 +400,47 @@ mod tests {
         let steering = without.other(Site::Steering);
         assert!(steering > 0.9, "{:?}", without.confirmed);
         assert!([EffectId::VyBias, EffectId::GyroScale].iter().all(|e| without.probability(*e) < 0.5));
+    }
+
+    #[test]
+    fn linearised_again_around_another_model_the_cause_is_found_there() {
+        let vehicle = VehicleParameters::f1tenth();
+        let recording = drive(&vehicle, 0.06);
+        let engine = Engine::new(&recording, &vehicle, tires(), TireTrust::file());
+        let both = split(&recording, true);
+        let null = engine.fit(&[], &engine.blank(), None, &both.training, 15);
+        let effects: Vec<EffectId> = EffectId::background().chain(LIBRARY).collect();
+        let flexible = Flexible::new(&recording, LARGE_SLIP_RAD, vehicle.wheelbase_m(), &Site::ALL);
+        let columns = Columns::new(effects, flexible);
+        let mut values = columns.blank(&engine);
+        values[..BASE].copy_from_slice(&null.parameters[..BASE]);
+        let scorer = Scorer::new(&engine, None, &both);
+        let nothing = Stated {
+            chosen: vec![0; FIRST + columns.effects.len() + columns.len() - columns.first_flexible()],
+            fitted: Refined { values, starts: null.starts },
+            statements: Vec::new(),
+        };
+        let (found, sizes) =
+            again(&engine, &columns, &LIBRARY, &both.training, 1.0, &scorer, nothing).unwrap();
+        let named: Vec<EffectId> = found.statements.iter().map(|s| columns.effects[s.term - FIRST]).collect();
+        assert_eq!(named, [EffectId::SteeringLag]);
+        let (size, _) = sizes.effect(&columns, EffectId::SteeringLag).unwrap();
+        assert!((size[0] - 0.06).abs() < 0.01, "{size:?}");
+    }
+
+    #[test]
+    fn what_stands_in_for_others_stays_in_the_model_beside_what_is_named_and_only_there() {
+        let mut found = inferred(0.06, &[]);
+        let [lag, bias] = [EffectId::SteeringLag, EffectId::VyBias].map(|e| found.term_of(e).unwrap());
+        let mut statement = found.statement(EffectId::SteeringLag).unwrap().clone();
+        statement.rivals.clear();
+        let of = |term, untried, closes| Statement { term, untried, closes, ..statement.clone() };
+        let (named, stands_in) = ([EffectId::SteeringLag], [EffectId::VyBias, EffectId::SteeringLag]);
+        found.stated = Some(vec![of(lag, 0, 0.2), of(bias, 3, 0.5)]);
+        assert_eq!((&found.accepted()[..], &found.modelled()[..]), (&named[..], &stands_in[..]));
+        found.refute(EffectId::VyBias);
+        assert_eq!((&found.accepted()[..], &found.modelled()[..]), (&named[..], &named[..]));
+        found.stated = Some(vec![of(lag, 3, 0.2)]);
+        assert!(found.accepted().is_empty() && found.modelled().is_empty());
     }
 }

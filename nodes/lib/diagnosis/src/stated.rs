@@ -24,6 +24,9 @@ const LOOKED_AT: usize = 8;
 /// Standard deviations of what any car has of an effect, beyond which it has more.
 const USUAL: f64 = 2.0;
 
+/// Times at most that effects are taken in and out.
+const TURNS: usize = 4;
+
 /// A configuration that was tried.
 #[derive(Debug, Clone)]
 struct Tried {
@@ -90,17 +93,11 @@ impl Around<'_, '_> {
                 now = alone;
             }
         }
-        let weeded = |start: Tried| {
-            let start = asked.with_effects_for_free_terms(asked.without_needless_free_terms(start));
-            let now = asked.with_likely_effects(start)?;
-            // What stood in for the effects is no longer needed beside them.
-            Some(asked.without_unlikely_effects(asked.without_needless_free_terms(now)))
-        };
         let least = nothing.cost;
-        let (mut now, mut simpler) = weeded(now)?;
+        let (mut now, mut simpler) = asked.weeded(now)?;
         // Each part may be needed beside the others, and all of them lead nowhere.
         if least < now.cost {
-            (now, simpler) = weeded(nothing)?;
+            (now, simpler) = asked.weeded(nothing)?;
         }
         let (now, simpler) = asked.with_the_likeliest_of_alike(now, simpler);
         let discrepancy = Discrepancy::of(self, &weighed.total, &now.chosen, &now.fitted.values)?;
@@ -160,9 +157,13 @@ impl Asked<'_, '_, '_, '_> {
         found
     }
 
-    /// A configuration fitted near the linearisation, for a look.
-    fn nearby(&self, chosen: Vec<usize>) -> Option<Tried> {
-        self.tried(chosen, |around, chosen| Some(around.nearby(&self.weighed.total, chosen)?.1))
+    /// A configuration fitted roughly, for a look: near the linearisation, or beside another one, whichever predicts better.
+    fn look(&self, chosen: Vec<usize>, beside: &Tried) -> Option<Tried> {
+        let total = &self.weighed.total;
+        let near = self.tried(chosen.clone(), |around, chosen| Some(around.nearby(total, chosen)?.1));
+        let beside =
+            self.tried(chosen, |around, chosen| Some(around.beside(total, chosen, beside.place()?)?.1));
+        near.into_iter().chain(beside).min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
 
     fn tried(
@@ -180,7 +181,7 @@ impl Asked<'_, '_, '_, '_> {
     fn lacking(&self, from: &Tried, part: &[usize]) -> Option<Tried> {
         let mut chosen = from.chosen.clone();
         part.iter().for_each(|&i| chosen[i] = 0);
-        let near = self.nearby(chosen.clone());
+        let near = self.look(chosen.clone(), from);
         // Worse than with no effect at all: too far away for a look.
         near.filter(|n| n.cost <= self.worst).or_else(|| self.fitted(chosen, from.place()))
     }
@@ -206,6 +207,23 @@ impl Asked<'_, '_, '_, '_> {
         let columns = self.around.columns;
         let terms = columns.of_site(site).map(|c| columns.term_of_flexible(c));
         terms.filter(|&t| of.chosen[t] > 0).collect()
+    }
+
+    /// Takes in what is likely and out what is not, by turns until nothing changes; what is left, and that without each effect.
+    fn weeded(&self, start: Tried) -> Option<(Tried, Vec<(usize, Tried)>)> {
+        let mut now = self.with_effects_for_free_terms(self.without_needless_free_terms(start));
+        let mut turns = 0;
+        loop {
+            let fuller = self.with_likely_effects(now)?;
+            let full = fuller.chosen.clone();
+            // What stood in for the effects is no longer needed beside them, and what it kept out may be likely without it.
+            let (left, simpler) = self.without_unlikely_effects(self.without_needless_free_terms(fuller));
+            turns += 1;
+            if left.chosen == full || turns == TURNS {
+                return Some((left, simpler));
+            }
+            now = left;
+        }
     }
 
     /// Takes out the free terms of one site after the other, the least needed first, as long as they close too little.
@@ -283,11 +301,9 @@ impl Asked<'_, '_, '_, '_> {
                 fuller
             };
             let offered = self.offered(&now, with);
-            // A look beside a look: what it falls short of a fit by is the same on both sides.
-            let near = self.nearby(now.chosen.clone())?.cost;
             let mut looked_at: Vec<(usize, f64)> = offered
                 .into_par_iter()
-                .filter_map(|i| Some((i, self.log_odds(near, self.nearby(with(i))?.cost))))
+                .filter_map(|i| Some((i, self.log_odds(now.cost, self.look(with(i), &now)?.cost))))
                 .filter(|(_, log_odds)| *log_odds > 0.0)
                 .collect();
             looked_at.sort_by(|a, b| b.1.total_cmp(&a.1));
