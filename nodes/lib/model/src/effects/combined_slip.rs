@@ -18,7 +18,7 @@ impl Effect for CombinedSlip {
         usual: Some(|_, size| 0.14 * size),
         reported: &[Reported { name: "k", unit: "1", value: |p| p[0].max(0.0).sqrt() }],
         starts: &[0.7],
-        spread: 0.08,
+        spread: 0.07,
         ..spec(
             "combined_slip",
             "F_y *= sqrt(max(0, 1 - (k F_x/(mu F_z))^2)) per axle",

@@ -22,7 +22,6 @@ impl Effect for RoadSlope {
         along: true,
         needs: COMMAND,
         reported: &[Reported { name: "angle_rad", unit: "rad", value: climb }],
-        spread: 0.02,
         ..spec(
             "road_slope",
             "v_x' -= g sin(angle); positive: uphill",
