@@ -31,7 +31,8 @@ use crate::{Outcome, outputs};
 /// blocks. With two, BAG is compared with BAG2: what has changed from the first drive to the second. With --same-state several drives of a car that
 /// nobody has touched are explained together. With --simulator or --simulator-bag the model is your own simulator.
 ///
-/// DIR receives gap.json, report.html, timing.json and extended_model.yaml (the named effects with their parameters).
+/// DIR receives gap.json, report.html, timing.json and extended_model.yaml (with their
+/// parameters: the effects named, and beside them what stands in for others that are not among the candidates).
 /// Exit code 3: the data cannot tell; with --simulator every verdict is an answer, 0.
 #[derive(Debug, Args)]
 #[command(after_help = names())]

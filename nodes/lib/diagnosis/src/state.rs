@@ -8,7 +8,7 @@ use gripsight_vehicle::OwnTires;
 /// A model with its parameters fitted.
 #[derive(Debug, Clone)]
 pub(crate) struct State {
-    /// Effects that are claimed.
+    /// Effects that are claimed, and what stands in beside them for others.
     pub(crate) named: Vec<EffectId>,
     /// All of the model: the background that is not claimed, what was handed over, then those that are claimed.
     pub(crate) effects: Vec<EffectId>,
