@@ -301,16 +301,11 @@ impl Asked<'_, '_, '_, '_> {
                 fuller
             };
             let offered = self.offered(&now, with);
-            let mut looked_at: Vec<(usize, f64)> = offered
-                .into_par_iter()
-                .filter_map(|i| Some((i, self.log_odds(now.cost, self.look(with(i), &now)?.cost))))
-                .filter(|(_, log_odds)| *log_odds > 0.0)
-                .collect();
-            looked_at.sort_by(|a, b| b.1.total_cmp(&a.1));
-            let likely = |(i, _): (usize, f64)| {
-                self.fitted(with(i), now.place()).filter(|fuller| self.log_odds(now.cost, fuller.cost) > 0.0)
-            };
-            match looked_at.into_iter().take(FITTED).find_map(likely) {
+            let looks: Vec<(usize, f64)> =
+                offered.into_par_iter().filter_map(|i| Some((i, self.look(with(i), &now)?.cost))).collect();
+            let likely = |cost: f64| self.log_odds(now.cost, cost) > 0.0;
+            let by_fit = |i: usize| self.fitted(with(i), now.place()).filter(|fuller| likely(fuller.cost));
+            match to_be_fitted(&looks, now.cost, likely).into_iter().find_map(by_fit) {
                 Some(fuller) => now = fuller,
                 None => return Some(now),
             }
@@ -382,5 +377,34 @@ impl Asked<'_, '_, '_, '_> {
             out.push(Needed { term: best, lacking, rivals });
         }
         (now, out)
+    }
+}
+
+/// Which effects are asked for by a fit, in this order, from the costs that looks at them ended with, in the order of their promise, and the cost without any
+/// of them: the likely ones, the best first, then those whose look went astray.
+fn to_be_fitted(looks: &[(usize, f64)], without: f64, is_likely: impl Fn(f64) -> bool) -> Vec<usize> {
+    let mut likely: Vec<(usize, f64)> = looks.iter().copied().filter(|(_, cost)| is_likely(*cost)).collect();
+    likely.sort_by(|a, b| a.1.total_cmp(&b.1));
+    // A model with one effect more does no worse: of a look that does, only a fit tells.
+    let astray = looks.iter().copied().filter(|(_, cost)| 1.0 - without / cost >= decisions::LEAST_CLOSED);
+    likely.into_iter().take(FITTED).chain(astray.take(FITTED)).map(|(effect, _)| effect).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn likely_effects_are_fitted_the_best_first_then_those_whose_look_ends_above_the_model_without_them() {
+        // Of effects 0 to 9: better, hardly different, far worse.
+        let looks =
+            [(0, 80.0), (1, 99.0), (2, 60.0), (3, 101.0), (4, 150.0), (5, 70.0), (6, 90.0), (7, 400.0)];
+        let asked = to_be_fitted(&looks, 100.0, |cost| cost < 95.0);
+        assert_eq!(
+            asked,
+            [2, 5, 0, 4, 7],
+            "three of the likely ones, and all that went astray in the order of their promise"
+        );
+        assert!(to_be_fitted(&looks[1..2], 100.0, |cost| cost < 95.0).is_empty());
     }
 }
