@@ -143,6 +143,12 @@ impl Answer {
         self.first_named().is_some_and(|e| e.confidence.unwrap_or(1.0) >= targets.confident)
     }
 
+    /// Whether an effect is named that was not put in and is not the drive's own.
+    #[must_use]
+    pub fn names_no_cause(&self) -> bool {
+        self.names().any(|name| !self.label.effects.iter().any(|truth| truth.name == name))
+    }
+
     /// How many of the true effects are named.
     #[must_use]
     pub fn found(&self) -> usize {

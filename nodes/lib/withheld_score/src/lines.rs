@@ -49,6 +49,11 @@ pub(crate) fn lines(scope: &[&Answer], own: &[&Answer], calibration: &Calibratio
         cases => format!("<= {:.3} (a perfect forecaster, {cases} cases)", calibration.perfect),
     };
     let errors = sizes.iter().map(|s| ((s.value - s.truth) / s.truth).abs()).collect();
+    let causes: Vec<(&Answer, &str)> = own
+        .iter()
+        .filter(|a| matches!(a.label.kind, Kind::Single | Kind::Pair))
+        .flat_map(|a| a.label.effects.iter().map(|e| (*a, e.name.as_str())))
+        .collect();
     vec![
         at_least("one effect: its site blamed", Rate::count(&singles, |a| a.site_right()), t.site),
         at_least("one effect: first name exact", Rate::count(&singles, |a| a.exact()), t.exact),
@@ -97,6 +102,9 @@ pub(crate) fn lines(scope: &[&Answer], own: &[&Answer], calibration: &Calibratio
             value: finite(median(errors)),
             met: None,
         },
+        counted("causes named, all cases", Rate::count(&causes, |(a, cause)| a.names().any(|n| n == *cause))),
+        counted("a name for no cause, all cases", Rate::count(own, |a| a.names_no_cause())),
+        counted("no effect: none of these", Rate::count(of_kind(own, Kind::None), |a| a.abstained())),
         figure(
             "calibration error of stated confidence",
             perfect,
@@ -149,6 +157,17 @@ pub(crate) fn at_most(what: &str, rate: Rate, most: f64) -> Line {
         rate: Some(rate),
         value: finite(rate.value()),
         met,
+    }
+}
+
+/// A rate without a target.
+fn counted(what: &str, rate: Rate) -> Line {
+    Line {
+        what: what.to_owned(),
+        wanted: "-".to_owned(),
+        value: Some(rate.value()),
+        rate: Some(rate),
+        met: None,
     }
 }
 

@@ -170,6 +170,9 @@ fn every_kind_is_judged_by_its_own_rule() {
     assert_eq!(rate("two effects"), (1, 2));
     // The truth in the library's terms, 1.1, lies in every stated interval; the mechanism's constant is another number.
     assert_eq!(rate("90 % intervals"), (4, 4));
+    assert_eq!(rate("causes named, all cases"), (4, 9));
+    assert_eq!(rate("a name for no cause, all cases"), (3, 12));
+    assert_eq!(rate("no effect: none of these"), (0, 2));
     assert!((line(&scores, "held-out").value.unwrap() - 0.8).abs() < 1e-12);
     assert!((line(&scores, "the same of an S4 residual").value.unwrap() - 0.5).abs() < 1e-12);
     let shown: usize = scores.effects.iter().flat_map(|e| &e.by_severity).map(|r| r.of).sum();
