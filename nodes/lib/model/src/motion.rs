@@ -43,6 +43,8 @@ struct Extra<T> {
 
 /// The inputs of an instant.
 struct Instant<'e, T> {
+    /// Whether it lies in the middle of a step of integration, for all of it.
+    is_middle: bool,
     v_x_mps: T,
     steering_rad: T,
     /// What the wheels are beyond that, just after a jump of their command: the tires have not rolled on it yet.
@@ -185,8 +187,13 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         let Moving { x, speed_mps, heading_rad, rates, pitch, force_mps2 } = state;
         *pitch = to;
         *force_mps2 = extra.force.end_mps2();
+        if self.relaxes {
+            let [before_rad, after_rad] = self.wheels.around_jump_rad(self.wheels.run_in() + k);
+            rates.memory.steady_rad[0] += after_rad - before_rad;
+        }
         for i in 0..substeps {
-            let middle = self.instant(k, (i as f64 + 0.5) / substeps as f64, &extra);
+            let share = (i as f64 + 0.5) / substeps as f64;
+            let middle = Instant { is_middle: true, ..self.instant(k, share, &extra) };
             let half = [x[0] + rates.v_y_mps2 * (h_s / 2.0), x[1] + rates.yaw_radps2 * (h_s / 2.0)];
             let there = self.rates(half, &middle, &rates.memory, h_s / 2.0, self.relaxes);
             *x = [x[0] + there.v_y_mps2 * h_s, x[1] + there.yaw_radps2 * h_s];
@@ -234,7 +241,7 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         let mut slip = [zero; 2];
         let count = self.wheels.run_in();
         for i in 0..=count {
-            let (k, steering_rad) = (start + i - count, self.wheels.at_sample_rad(i));
+            let (k, [steering_rad, after_rad]) = (start + i - count, self.wheels.around_jump_rad(i));
             let v_x = self.car.speed_factor * run.v_x_mps[k].max(MIN_SPEED_MPS);
             let (v_y, r) = (run.smooth[0][k], run.smooth[1][k]);
             let now = [
@@ -245,7 +252,7 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
             for axle in 0..2 {
                 slip[axle] = if i == 0 { now[axle] } else { lag.step(slip[axle], steady[axle], now[axle]) };
             }
-            steady = now;
+            steady = if i < count { [now[0] + (after_rad - steering_rad), now[1]] } else { now };
         }
         [slip[0] - steady[0], slip[1] - steady[1]]
     }
@@ -292,10 +299,21 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         let more =
             flexible.and_then(|f| f.speed_factor(self.model.flexible_parameters(self.p), v_x_mps, a_x_mps2));
         let true_mps = self.car.speed_factor * v_x_mps;
+        let (mut steering_rad, mut jump_rad) =
+            (self.wheels.angle_rad(k, share), self.wheels.jump_rad(k, share));
+        let at_sample = share == 0.0 || share == 1.0;
+        if self.relaxes && at_sample {
+            // Relaxed slips follow the wheels as they were until the sample.
+            let here = self.wheels.run_in() + k + usize::from(share == 1.0);
+            let [before_rad, _] = self.wheels.around_jump_rad(here);
+            jump_rad += (steering_rad - before_rad).re();
+            steering_rad = before_rad;
+        }
         Instant {
+            is_middle: false,
             v_x_mps: more.map_or(true_mps, |more| true_mps * more),
-            steering_rad: self.wheels.angle_rad(k, share),
-            jump_rad: self.wheels.jump_rad(k, share),
+            steering_rad,
+            jump_rad,
             a_x_mps2,
             carried_a_x_mps2: {
                 let [from, to] = extra.carried_a_x_mps2;
@@ -324,6 +342,7 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         let at = Moment {
             v_x_mps: v_x,
             yaw_rate_radps: r,
+            steering_rad: now.steering_rad,
             a_y_mps2: memory.a_y_mps2,
             rolled_a_y_mps2: memory.rolled_a_y_mps2,
             front_use: memory.front_use,
@@ -347,18 +366,24 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
             front_rad - ((v_y + r * car.l_f_m) / v_x).atan(),
             axles.rear.steer_rad - ((v_y - r * car.l_r_m) / v_x).atan(),
         ];
-        let mut jump_rad = now.jump_rad;
+        let mut jump_rad = T::from(now.jump_rad);
         let mut slip_rad = steady_rad;
         if relaxes && h_s > 0.0 {
-            let lag = Lag::new(h_s, car.relaxation_m / v_x);
+            let step_s = if now.is_middle { 2.0 * h_s } else { h_s };
+            let lag = Lag::new(step_s, car.relaxation_m / v_x);
             for (i, slip) in slip_rad.iter_mut().enumerate() {
-                *slip = lag.step(memory.slip_rad[i], memory.steady_rad[i], steady_rad[i]);
+                let (from, before) = (memory.slip_rad[i], memory.steady_rad[i]);
+                *slip = if now.is_middle {
+                    lag.mean(from, before, steady_rad[i])
+                } else {
+                    lag.step(from, before, steady_rad[i])
+                };
             }
         } else if relaxes {
             slip_rad = memory.slip_rad;
         }
         if relaxes {
-            jump_rad *= at_once(car.relaxation_m.re() / v_x.re());
+            jump_rad *= at_once(car.relaxation_m / v_x);
         }
         let force = |axle: &Axle<T>, tire: &gripsight_vehicle::MagicFormula<T>, slip: T| {
             tire.normalized_force(slip / axle.grip) * axle.grip * axle.usable

@@ -16,9 +16,10 @@ const RUN_IN_S: f64 = 0.6;
 /// How long after a jump of the command a sample sees what it does: as good as at once, beside any tire's relaxation.
 const LOOK_S: f64 = 3e-4;
 
-/// The share of a jump that has passed a lag of `lag_s` when a sample sees it.
-pub(crate) fn at_once(lag_s: f64) -> f64 {
-    if lag_s > 0.0 { 1.0 - (-LOOK_S / lag_s).exp() } else { 1.0 }
+/// The share of a jump that has passed a lag of `lag_s` when a sample sees it. An exponential has no derivative at a lag of nothing, whence no fit would lead
+/// away; the fraction that agrees with it for any lag of a tire has one.
+pub(crate) fn at_once<T: Real>(lag_s: T) -> T {
+    (lag_s / LOOK_S + 1.0).recip()
 }
 
 /// Road-wheel angles over a window and some time before it.
@@ -102,6 +103,12 @@ impl<T: Real> RoadWheels<T> {
         let course = &self.course_rad;
         let here = course[i.min(course.len() - 1)];
         if self.is_held { (course[i.saturating_sub(1)] + here) * 0.5 } else { here }
+    }
+
+    /// What the wheels of a held command are until they jump at a sample, counted from the run-in's first, and what from then on.
+    pub(crate) fn around_jump_rad(&self, i: usize) -> [T; 2] {
+        let at = |i: usize| self.course_rad[i.min(self.course_rad.len() - 1)];
+        if self.is_held { [at(i.saturating_sub(1)), at(i)] } else { [self.at_sample_rad(i); 2] }
     }
 
     /// `share` of a step after sample `k` of the window; a jump at a sample is half made there.
@@ -226,9 +233,10 @@ mod tests {
             (EffectId::SteeringDelay, &[0.043]),
             (EffectId::SteeringBacklash, &[0.01]),
             (EffectId::SteeringGain, &[0.2]),
+            (EffectId::TireRelaxation, &[0.003]),
             (EffectId::TireRelaxation, &[0.01]),
         ];
-        // Relaxed slips and a limited rate are followed in lines, which a jump within a step is not.
+        // A limited rate is followed in lines, which a jump within a step is not; tires that roll far forget a jump.
         const IN_LINES: &[(EffectId, &[f64])] =
             &[(EffectId::TireRelaxation, &[0.1]), (EffectId::SteeringRateLimit, &[2.0])];
         assert!(off(true, &[]) < 4e-4, "{}", off(true, &[]));
@@ -240,6 +248,32 @@ mod tests {
             let (held, lines) = (off(true, &[*effect]), off(false, &[*effect]));
             assert!(held < 2e-3 && held < 1.05 * lines, "{effect:?}: {held}, interpolated {lines}");
         }
+    }
+
+    #[test]
+    fn a_sample_sees_a_jump_before_the_tires_have_rolled_on_it() {
+        const JUMP: usize = 50;
+        let mut recording = recording(4);
+        let run = &mut recording.runs[0];
+        let command_rad = |k: usize| if k < WINDOW.from + JUMP { 0.0 } else { 0.05 };
+        run.steering_rad = (0..run.len()).map(command_rad).collect();
+        run.held_steering_rad = run.steering_rad.clone();
+        let hold_s = 0.5 * run.dt_s;
+        let vehicle = VehicleParameters::f1tenth();
+        let a_y_mps2 = |effects: &[EffectId], own: &[f64]| {
+            let mut p = tires().to_parameters().to_vec();
+            p.push(hold_s);
+            p.extend(own);
+            ExtendedModel::new(&recording, &vehicle, effects, 0.005).predict(&p, [0.0; 2], &WINDOW).a_y_mps2
+        };
+        let at_once = a_y_mps2(&[], &[]);
+        // Of a lag of 2 ms a sample sees next to nothing at the jump, all of it one step later.
+        let relaxed = a_y_mps2(&[EffectId::TireRelaxation], &[0.002 * recording.runs[0].v_x_mps[0]]);
+        let before_mps2 = at_once[JUMP - 1];
+        let seen = |k: usize| (relaxed[k] - before_mps2) / (at_once[JUMP] - before_mps2);
+        assert!(seen(JUMP - 1).abs() < 0.02 && seen(JUMP) < 0.2, "{} {}", seen(JUMP - 1), seen(JUMP));
+        let later = relaxed[JUMP + 1] / at_once[JUMP + 1];
+        assert!((later - 1.0).abs() < 0.02, "{later}");
     }
 
     #[test]

@@ -152,6 +152,8 @@ pub struct Moment<T> {
     pub v_x_mps: T,
     /// Yaw rate.
     pub yaw_rate_radps: T,
+    /// Angle of the front wheels, but for what the axles' effects add.
+    pub steering_rad: T,
     /// Lateral acceleration from the tires, a moment ago.
     pub a_y_mps2: T,
     /// The same behind the roll of the body.
@@ -268,6 +270,12 @@ impl<T: Real> Lag<T> {
             None => settled,
         }
     }
+
+    /// The output on average over the step: where the lag is short, the end of the step does not show that it came late. `middle`: the input halfway.
+    pub(crate) fn mean(&self, y0: T, u0: T, middle: T) -> T {
+        let end = self.step(y0, u0, middle * 2.0 - u0);
+        middle - (end - y0) / self.h_s * self.tau_s
+    }
 }
 
 /// A body on springs and dampers, half critically damped, over steps of one length: what they carry of an acceleration a,
@@ -334,5 +342,24 @@ mod tests {
         approx::assert_relative_eq!(carried(1000.0), 1000.0);
         approx::assert_relative_eq!(carried(1100.0), 1100.0 * 0.99);
         approx::assert_relative_eq!(carried(800.0), 800.0 * 1.02);
+    }
+
+    #[test]
+    fn a_lag_is_the_solution_of_its_equation_at_the_end_of_a_step_and_on_average() {
+        const STEPS: usize = 100_000;
+        const H_S: f64 = 0.005;
+        let (y0, u0, u1) = (0.3, 1.0, 1.4);
+        for tau_s in [1e-4, 1e-3, 0.01] {
+            let (mut y, mut sum) = (y0, 0.0);
+            for i in 0..STEPS {
+                let u = u0 + (u1 - u0) * (i as f64 + 0.5) / STEPS as f64;
+                let next = u + (y - u) * (-H_S / STEPS as f64 / tau_s).exp();
+                sum += 0.5 * (y + next) / STEPS as f64;
+                y = next;
+            }
+            let lag = Lag::new(H_S, tau_s);
+            approx::assert_relative_eq!(lag.step(y0, u0, u1), y, epsilon = 1e-6);
+            approx::assert_relative_eq!(lag.mean(y0, u0, 0.5 * (u0 + u1)), sum, epsilon = 1e-6);
+        }
     }
 }

@@ -35,6 +35,7 @@ mod low_grip_patch;
 mod mass_error;
 mod odometry_delay;
 mod odometry_low_pass;
+mod outer_wheel_moment;
 mod road_bank;
 mod road_slope;
 mod roll_steer;
@@ -253,6 +254,7 @@ library! {
     GyroBias = gyro_bias::GyroBias,
     DriveSplit = drive_split::DriveSplit,
     BrakeSplit = brake_split::BrakeSplit,
+    OuterWheelMoment = outer_wheel_moment::OuterWheelMoment,
 }
 
 impl EffectId {
@@ -387,10 +389,11 @@ mod tests {
         assert_eq!(usual(EffectId::TireRelaxation), Some(0.33 * 0.05));
         assert_eq!(usual(EffectId::LongitudinalLoadTransfer), Some(0.33 * 0.1));
         assert_eq!(usual(EffectId::YawInertiaError), Some(0.67 * 2.0));
+        assert_eq!(usual(EffectId::OuterWheelMoment), Some(2.0));
         assert_eq!(usual(EffectId::GyroScale), None);
         let stated = VehicleParameters { drive_front_share: Some(0.5), ..car };
         assert_eq!(EffectId::DriveSplit.usual(&stated, 0.1), Some(0.03));
         assert_eq!(EffectId::BrakeSplit.usual(&stated, 0.1), Some(0.3));
-        assert_eq!(EffectId::background().count(), 7);
+        assert_eq!(EffectId::background().count(), 8);
     }
 }

@@ -17,6 +17,7 @@ pub(super) fn moment() -> Moment<f64> {
     Moment {
         v_x_mps: 5.0,
         yaw_rate_radps: 1.2,
+        steering_rad: 0.1,
         a_y_mps2: 6.0,
         rolled_a_y_mps2: 5.0,
         front_use: 0.6,
