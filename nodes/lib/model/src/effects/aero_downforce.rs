@@ -14,7 +14,6 @@ pub(super) struct AeroDownforce;
 impl Effect for AeroDownforce {
     const SPEC: EffectSpec = EffectSpec {
         unknown: Unknown { share: LOAD_SENSITIVITY_SHARE, samples: 0.0 },
-        spread: 0.02,
         ..spec(
             "aero_downforce",
             "F_zf += c_f m g v^2, F_zr += c_r m g v^2",

@@ -15,7 +15,6 @@ impl Effect for GripScale {
     const SPEC: EffectSpec = EffectSpec {
         alike: &[EffectId::GripBalance],
         needs: &[Need::ReferenceTires],
-        spread: 0.26,
         ..spec(
             "grip_scale",
             "D_f, D_r *= 1 + m",

@@ -16,7 +16,7 @@ impl Effect for ImuLeverArm {
         // Within a sample nobody knows when command and inertial unit were read.
         unknown: Unknown { share: 0.0, samples: 0.12 },
         needs: ACCELEROMETER,
-        spread: 0.10,
+        spread: 0.04,
         ..spec(
             "imu_lever_arm",
             "a_ym = a_y + x r' - y r^2, a_xm = a_x - y r' - x r^2",

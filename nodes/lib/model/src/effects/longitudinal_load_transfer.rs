@@ -18,7 +18,7 @@ impl Effect for LongitudinalLoadTransfer {
         // About a third of what the height of the centre of gravity gives.
         usual: Some(|car, _| 0.33 * car.h_cg_m),
         unknown: Unknown { share: LOAD_SENSITIVITY_SHARE, samples: 0.0 },
-        spread: 0.18,
+        spread: 0.19,
         lagging: &[Lagging::Pitch],
         sizing: 1,
         ..spec(

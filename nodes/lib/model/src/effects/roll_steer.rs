@@ -15,7 +15,7 @@ impl Effect for RollSteer {
     const SPEC: EffectSpec = EffectSpec {
         lagging: &[Lagging::Roll],
         sizing: 1,
-        spread: 0.09,
+        spread: 0.02,
         ..spec(
             "roll_steer",
             "d_r = k a_y/g behind the roll of the body, which follows in a time T",

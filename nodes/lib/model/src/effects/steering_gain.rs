@@ -13,7 +13,7 @@ impl Effect for SteeringGain {
     const SPEC: EffectSpec = EffectSpec {
         outside: Some(OutsideTerm::SteeringGain),
         figure: Some(Figure { name: "steering_scale", stated: |_| Some(1.0), value: |_, gain| 1.0 + gain }),
-        spread: 0.18,
+        spread: 0.12,
         ..spec(
             "steering_gain",
             "d = (1 + g) u",

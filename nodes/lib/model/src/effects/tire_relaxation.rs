@@ -18,7 +18,7 @@ impl Effect for TireRelaxation {
         lagging: &[Lagging::Slip],
         alike: &[EffectId::SteeringDelay, EffectId::SteeringLag],
         starts: &[0.5, 0.15],
-        spread: 0.09,
+        spread: 0.10,
         ..spec(
             "tire_relaxation",
             "sigma/v alpha' + alpha = alpha_ss (linearly: sigma/v F' + F = F_ss)",

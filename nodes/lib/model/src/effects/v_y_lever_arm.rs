@@ -13,7 +13,6 @@ pub(super) struct VyLeverArm;
 impl Effect for VyLeverArm {
     const SPEC: EffectSpec = EffectSpec {
         outside: Some(OutsideTerm::VYLeverArm),
-        spread: 0.05,
         ..spec(
             "v_y_lever_arm",
             "v_ym = v_y + x r",
