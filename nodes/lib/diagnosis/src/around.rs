@@ -99,7 +99,7 @@ impl Around<'_, '_> {
     /// A configuration fitted by rollouts, between two linearisations.
     pub(crate) fn by_rollouts(&self, problem: &Quadratic, chosen: &[usize]) -> Option<Refined> {
         let linear = configuration(problem, self.dispersion, self.terms, chosen)?;
-        self.refined(ITERATIONS, chosen, &linear.step, Vec::new())
+        self.refined(ITERATIONS, chosen, &linear.step, self.places(&linear.step)).map(|(_, fitted)| fitted)
     }
 
     /// The same, as far as it goes. `near`: another one that is fitted, and which one; what tells them apart is added by the linearisation.
@@ -111,7 +111,31 @@ impl Around<'_, '_> {
     ) -> Option<Refined> {
         let step = configuration(problem, self.dispersion, self.terms, chosen)?.step;
         let near = near.and_then(|near| self.beginnings(near, problem, chosen, &step)).unwrap_or_default();
-        self.refined(ITERATIONS_TO_THE_END, chosen, &step, near)
+        let begins = self.places(&step).into_iter().chain(near).collect();
+        let (cost, fitted) = self.refined(ITERATIONS_TO_THE_END, chosen, &step, begins)?;
+        let alone = self.without_alike(chosen, &fitted);
+        let alone = alone.and_then(|begin| self.refined(ITERATIONS_TO_THE_END, chosen, &step, vec![begin]));
+        Some(alone.filter(|(alone, _)| *alone < cost).map_or(fitted, |(_, alone)| alone))
+    }
+
+    /// Where a linearisation leads, and where it was made.
+    fn places(&self, step: &DVector<f64>) -> Vec<Refined> {
+        let linear = self.values.iter().zip(step.iter()).map(|(v, s)| v + s).collect();
+        [linear, self.values.to_vec()].map(|values| Refined { values, starts: self.starts.to_vec() }).into()
+    }
+
+    /// A fit without the little of what does nearly the same as an effect that the model has: between the two it may have ended where neither is right,
+    /// for what tells them apart (a jump of the command, seen at once or not) shows only close to either.
+    fn without_alike(&self, chosen: &[usize], fitted: &Refined) -> Option<Refined> {
+        let mut values = fitted.values.clone();
+        let terms = || self.columns.effects.iter().zip(&chosen[FIRST..]);
+        for alike in terms().filter(|(_, c)| **c > 0).flat_map(|(e, _)| e.spec().alike) {
+            let is_little = terms().any(|(e, c)| e == alike && *c == 0) && alike.spec().usual.is_some();
+            if let Some(range) = self.columns.of_effect(*alike).filter(|_| is_little) {
+                values[range].copy_from_slice(&self.engine.absent(*alike));
+            }
+        }
+        (values != fitted.values).then(|| Refined { values, starts: fitted.starts.clone() })
     }
 
     /// The effect of a configuration that is absent in a model, and whose derivative vanishes there: no fit leads away from where it is absent.
@@ -175,9 +199,9 @@ impl Around<'_, '_> {
         iterations: usize,
         chosen: &[usize],
         step: &DVector<f64>,
-        near: Vec<Refined>,
-    ) -> Option<Refined> {
-        let Self { engine, columns, terms, values, starts, windows, dispersion, .. } = *self;
+        begins: Vec<Refined>,
+    ) -> Option<(f64, Refined)> {
+        let Self { engine, columns, terms, values, windows, dispersion, .. } = *self;
         let in_use = self.in_use(chosen);
         let mut target = columns.blank(engine);
         let mut parameters = Vec::new();
@@ -203,14 +227,8 @@ impl Around<'_, '_> {
                 }),
             });
         }
-        let linear = Refined {
-            values: values.iter().zip(step.iter()).map(|(v, s)| v + s).collect(),
-            starts: starts.to_vec(),
-        };
-        let here = Refined { values: values.to_vec(), starts: starts.to_vec() };
-        let ((_, cost), begin) = [linear, here]
+        let ((_, cost), begin) = begins
             .into_iter()
-            .chain(near)
             .map(|begin| {
                 let stuck = self.stuck(chosen, &begin.values).is_some();
                 let at: Vec<f64> = parameters
@@ -233,7 +251,8 @@ impl Around<'_, '_> {
         for (&column, &v) in map.iter().zip(&best.parameters) {
             target[column] = v;
         }
-        best.at.cost.is_finite().then_some(Refined { values: target, starts: best.starts })
+        let cost = best.at.cost;
+        cost.is_finite().then_some((cost, Refined { values: target, starts: best.starts }))
     }
 
     /// A configuration fitted roughly, for a look, from the linear answer, with the logarithm of its evidence by rollouts, its prior weight counted.
