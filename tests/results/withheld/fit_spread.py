@@ -5,12 +5,14 @@ effects' files (nodes/lib/model/src/effects) is the larger of an effect's parame
 
     fit_spread.py LABELS VERDICTS [LABELS VERDICTS ...]      LABELS of `gripsight withheld make`, VERDICTS of `gripsight withheld diagnose`
 
+Beneath each: the mean of what is found, by car. A sign that a car always has is something that the model lacks.
 Counted are drives whose cause the library has: where it lacks it, something must look like it.
 """
 
 import csv
 import json
 import math
+import statistics
 import sys
 from pathlib import Path
 
@@ -25,7 +27,7 @@ SHARED = 0.04
 
 
 def found(batches):
-    """For each parameter: values where its effect is not, and their standard errors, in sizes that matter."""
+    """For each parameter: values where its effect is not, their standard errors, in sizes that matter, and the car."""
     out = {}
     for labels, verdicts in batches:
         for case in json.loads(Path(labels).read_text())["cases"]:
@@ -38,7 +40,9 @@ def found(batches):
                     continue
                 null = 1.0 if limit["parameter"] == "ratio" else 0.0
                 of = (limit["value"] - null, limit["standard_error"])
-                out.setdefault((limit["name"], limit["parameter"]), []).append([v / limit["matters"] for v in of])
+                car = str(case["circumstances"].get("car")).rstrip("_0123456789")
+                found_here = [*(v / limit["matters"] for v in of), car]
+                out.setdefault((limit["name"], limit["parameter"]), []).append(found_here)
     return out
 
 
@@ -49,7 +53,7 @@ def quantile(values, at):
 
 def spread(sizes):
     def outside(more):
-        return quantile([abs(v) / math.hypot(s, SHARED, more) for v, s in sizes], INSIDE) > NINETY
+        return quantile([abs(v) / math.hypot(s, SHARED, more) for v, s, _ in sizes], INSIDE) > NINETY
 
     low, high = 0.0, 8.0
     if not outside(low):
@@ -60,15 +64,25 @@ def spread(sizes):
     return high
 
 
+def by_car(sizes):
+    for car in sorted({car for *_, car in sizes}):
+        values = [v for v, _, own in sizes if own == car]
+        if len(values) > 1:
+            error = statistics.stdev(values) / math.sqrt(len(values))
+            yield f"{car} {statistics.mean(values):.2f} ± {error:.2f}"
+
+
 def main():
-    rows = []
+    rows, means = [], []
     for (effect, parameter), sizes in sorted(found(zip(sys.argv[1::2], sys.argv[2::2])).items()):
-        error = quantile([s for _, s in sizes], 0.5)
+        error = quantile([s for _, s, _ in sizes], 0.5)
         rows.append([effect, parameter, len(sizes), f"{error:.3f}", f"{spread(sizes) if len(sizes) >= LEAST_DRIVES else 0.0:.2f}"])
+        means.append(", ".join(by_car(sizes)))
     with TABLE.open("w", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows([HEAD, *rows])
-    for row in rows:
+    for row, mean in zip(rows, means):
         print(f"{row[0]:28s}{row[1]:18s}{row[2]:5d} drives, standard error {row[3]}, spread {row[4]}")
+        print(f"    mean by car: {mean}")
 
 
 if __name__ == "__main__":
