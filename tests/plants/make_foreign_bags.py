@@ -120,7 +120,7 @@ class Slipx:
             ratio = tire.mu_x0 / tire.mu_y0
             tire.mu_y0, tire.mu_x0 = mu, mu * ratio
         self.vehicle = dict(
-            mass_kg=p.mass, yaw_inertia_kgm2=p.izz, l_f_m=p.lf, l_r_m=p.lr, h_cg_m=p.h_cog,
+            mass_kg=p.mass, yaw_inertia_kgm2=p.izz, l_f_m=p.lf, l_r_m=p.lr, h_cg_m=p.h_cog, track_width_m=p.track_front,
             drive_front_share=0.0, brake_front_share=0.0,
         )
         self.wheelbase_m, self.top_mps = p.lf + p.lr, 12.0
@@ -173,7 +173,7 @@ class Multibody:
         p.tire.p_dy1 = mu
         self.p = p
         self.vehicle = dict(
-            mass_kg=p.m, yaw_inertia_kgm2=p.I_z, l_f_m=p.a, l_r_m=p.b, h_cg_m=p.h_cg,
+            mass_kg=p.m, yaw_inertia_kgm2=p.I_z, l_f_m=p.a, l_r_m=p.b, h_cg_m=p.h_cg, track_width_m=0.5 * (p.T_f + p.T_r),
             drive_front_share=float(p.T_se), brake_front_share=float(p.T_sb),
         )
         self.wheelbase_m, self.top_mps = p.a + p.b, 33.0

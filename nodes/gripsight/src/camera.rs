@@ -155,19 +155,19 @@ fn choose_topic(bag: &Bag, args: &CameraArgs) -> anyhow::Result<String> {
     Ok((*most).to_owned())
 }
 
-/// The mean of what the pictures of some bags say, each at the distance that the odometry had by then. A bag without pictures adds nothing.
-pub(crate) fn prior_of_bags(
+/// What the pictures of some bags say, each at the distance that the odometry had by then. A bag without pictures adds nothing.
+pub(crate) fn pictures_of_bags(
     paths: &[PathBuf],
     topics: &TopicMap,
     args: &CameraArgs,
-) -> anyhow::Result<FrictionPrior> {
+) -> anyhow::Result<Seen> {
     let mut estimator = args.estimator()?;
-    let mut seen = Seen::default();
+    let mut pictures = Vec::new();
     for path in paths {
         estimator.reset();
         let read = each_picture(path, topics, args, |shot| {
             let frame = Frame { stamp_ns: shot.stamp_ns, data: shot.data };
-            seen.take(&estimator.update(&frame, shot.stamp_ns, &shot.motion));
+            pictures.push((shot.stamp_ns, estimator.update(&frame, shot.stamp_ns, &shot.motion)));
             Ok(())
         });
         match read {
@@ -175,52 +175,55 @@ pub(crate) fn prior_of_bags(
             other => drop(other?),
         }
     }
-    let names = paths.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", ");
-    seen.mean().with_context(|| format!("{names}: no picture tells the friction"))
+    let bags = paths.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", ");
+    Ok(Seen { bags, several: paths.len() > 1, pictures })
 }
 
-/// Sums over pictures.
-#[derive(Default)]
-struct Seen {
-    valid: usize,
-    new_floor: usize,
-    mu: f64,
-    second: f64,
-    refused: BTreeMap<&'static str, usize>,
+/// What pictures said.
+pub(crate) struct Seen {
+    /// Whose they are.
+    bags: String,
+    /// Whether those are several, whose stamps say nothing of each other.
+    several: bool,
+    /// Stamp and estimate of each.
+    pictures: Vec<(i64, Estimate)>,
 }
 
 impl Seen {
-    fn take(&mut self, estimate: &Estimate) {
-        match estimate.reason {
-            None => {
-                self.valid += 1;
-                self.new_floor += usize::from(estimate.new_floor());
-                self.mu += estimate.mu;
-                self.second += estimate.mu.powi(2) + estimate.sigma.powi(2);
+    /// The mean of what the pictures between two stamps say; of several bags, all.
+    pub(crate) fn between(&self, from_ns: i64, to_ns: i64) -> anyhow::Result<FrictionPrior> {
+        let inside = |(stamp_ns, _): &&(i64, Estimate)| self.several || (from_ns..=to_ns).contains(stamp_ns);
+        let estimates = self.pictures.iter().filter(inside).map(|(_, estimate)| estimate);
+        let (mut mu, mut second, mut valid, mut new_floor) = (0.0, 0.0, 0.0, 0_usize);
+        let mut refused: BTreeMap<&'static str, usize> = BTreeMap::new();
+        for estimate in estimates {
+            match estimate.reason {
+                None => {
+                    valid += 1.0;
+                    new_floor += usize::from(estimate.new_floor());
+                    mu += estimate.mu;
+                    second += estimate.mu.powi(2) + estimate.sigma.powi(2);
+                }
+                Some(reason) => *refused.entry(reason.as_str()).or_default() += 1,
             }
-            Some(reason) => *self.refused.entry(reason.as_str()).or_default() += 1,
         }
-    }
-
-    fn mean(&self) -> anyhow::Result<FrictionPrior> {
-        let refused = self.refused.iter().map(|(why, n)| format!("{n} {why}")).collect::<Vec<_>>().join(", ");
-        if self.valid == 0 {
-            bail!("{}", if refused.is_empty() { "there is none".to_owned() } else { refused });
+        let refused = refused.iter().map(|(why, n)| format!("{n} {why}")).collect::<Vec<_>>().join(", ");
+        if valid == 0.0 {
+            let why = if refused.is_empty() { "there is none".to_owned() } else { refused };
+            bail!("{}: no picture tells the friction: {why}", self.bags);
         }
-        let count = self.valid as f64;
-        let mu = self.mu / count;
-        // Two surfaces in one bag are one wide prior.
-        let prior = FrictionPrior { mu, sigma: (self.second / count - mu * mu).max(0.0).sqrt() };
+        let mu = mu / valid;
+        // Two surfaces in one drive are one wide prior.
+        let prior = FrictionPrior { mu, sigma: (second / valid - mu * mu).max(0.0).sqrt() };
         let rest = if refused.is_empty() { String::new() } else { format!("; not used: {refused}") };
-        let new = match self.new_floor {
+        let new = match new_floor {
             0 => String::new(),
             n => format!("; {n} show a floor that the calibration has not seen"),
         };
         tracing::info!(
-            "friction prior {:.2} +- {:.2} from {} pictures{new}{rest}",
+            "friction prior {:.2} +- {:.2} from {valid:.0} pictures{new}{rest}",
             prior.mu,
-            prior.sigma,
-            self.valid
+            prior.sigma
         );
         Ok(prior)
     }

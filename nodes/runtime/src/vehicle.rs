@@ -30,6 +30,12 @@ pub fn vehicle_parameters(node: &mut Node) -> Result<VehicleParameters, Error> {
         l_f_m: number("l_f_m", 0.0, "Centre of gravity to front axle [m]; required")?,
         l_r_m: number("l_r_m", 0.0, "Centre of gravity to rear axle [m]; required")?,
         h_cg_m: number("h_cg_m", 0.0, "Height of the centre of gravity [m]")?,
+        track_width_m: Some(number(
+            "track_width_m",
+            0.0,
+            "Distance between the wheels of an axle [m]; 0: not known",
+        )?)
+        .filter(|&track| track != 0.0),
         drive_front_share: Some(number(
             "drive_front_share",
             NOT_STATED,

@@ -1,5 +1,6 @@
 //! `gripsight identify`: a bag in, tires out.
 
+mod floors;
 mod posterior;
 pub(crate) mod previous;
 mod progress;
@@ -18,14 +19,14 @@ use gripsight_bag::{ReadReport, TopicMap, read_sequences};
 use gripsight_diagnosis::{ExtendedModelFile, without_effects};
 use gripsight_identification::export::{Provenance, TireFiles, read_text};
 use gripsight_identification::{
-    self as identification, Config, FrictionPrior, Method, ResidualKind, Status, ValidWithin, identify,
+    self as identification, Config, FrictionPrior, Method, OnOneFloor, ResidualKind, Status, ValidWithin,
 };
 use gripsight_report::{Header, IdentificationInput, identification_page};
-use gripsight_signals::{StateSequence, WindowConfig};
+use gripsight_signals::{NS_PER_S, StateSequence, WindowConfig};
 use gripsight_vehicle::VehicleParameters;
 
 use crate::Outcome;
-use crate::camera::{CameraArgs, prior_of_bags};
+use crate::camera::{CameraArgs, Seen, pictures_of_bags};
 use crate::data::{notes as signal_notes, with_checks};
 use crate::diagnose::extended_model;
 use crate::invocation::{file_name, invocation};
@@ -45,6 +46,9 @@ use windows::Windows;
 /// A bag of odometry and drive commands is taken as one stretch. A bag of recorded state sequences is worked through in
 /// their order, as the nodes do live, each starting from the set accepted last; the files describe the last one. So is a bag
 /// of odometry with --window; windows.csv then holds every window, and when a change of the grip was noticed.
+///
+/// Where the grip changes within a drive, each floor is identified by itself: the files describe the last one, which the car is on now; those before it are in
+/// DIR/floor_1 and on, and windows.csv holds a line each.
 ///
 /// Several bags of one car give more slip and tighter intervals; where one of them alone says something else than all together, that is said.
 #[derive(Debug, Args)]
@@ -164,18 +168,18 @@ impl IdentifyArgs {
         VehicleParameters::from_ros_yaml(&text).with_context(|| format!("cannot use {}", path.display()))
     }
 
-    fn prior(&self, topics: &TopicMap) -> anyhow::Result<Option<FrictionPrior>> {
-        if self.camera {
-            return Ok(match prior_of_bags(&self.bags, topics, &self.pictures) {
-                Ok(prior) => Some(prior),
-                // The data alone are judged first: a prior is one set more, and its lack is no reason to lose the other.
-                Err(error) => {
-                    tracing::warn!("no friction prior: {error:#}; identified without one");
-                    None
-                }
-            });
+    fn belief(&self, topics: &TopicMap) -> Belief {
+        if !self.camera {
+            return Belief::Stated(self.prior_mu.map(|mu| FrictionPrior { mu, sigma: self.prior_sigma }));
         }
-        Ok(self.prior_mu.map(|mu| FrictionPrior { mu, sigma: self.prior_sigma }))
+        // The data alone are judged first: a prior is one set more, and its lack is no reason to lose the other.
+        match pictures_of_bags(&self.bags, topics, &self.pictures) {
+            Ok(seen) => Belief::Seen(seen),
+            Err(error) => {
+                tracing::warn!("no friction prior: {error:#}; identified without one");
+                Belief::Stated(None)
+            }
+        }
     }
 
     /// What to identify from, in order.
@@ -202,6 +206,32 @@ impl IdentifyArgs {
     }
 }
 
+/// What is believed of the friction before the tires tell.
+enum Belief {
+    /// The same all along.
+    Stated(Option<FrictionPrior>),
+    /// What pictures say, each of its place.
+    Seen(Seen),
+}
+
+impl Belief {
+    /// Of the floor that a drive, or a part of one, is on.
+    fn of(&self, sequence: &StateSequence) -> Option<FrictionPrior> {
+        let seen = match self {
+            Self::Stated(prior) => return *prior,
+            Self::Seen(seen) => seen,
+        };
+        let to_ns = sequence.start_stamp_ns + (sequence.duration_s() * NS_PER_S) as i64;
+        match seen.between(sequence.start_stamp_ns, to_ns) {
+            Ok(prior) => Some(prior),
+            Err(error) => {
+                tracing::warn!("no friction prior: {error:#}; identified without one");
+                None
+            }
+        }
+    }
+}
+
 pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
     let mut timing = Timing::default();
     let start = Instant::now();
@@ -223,7 +253,7 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
     }
     let notes = data_notes(&report, model.as_ref());
     timing.reading_s = start.elapsed().as_secs_f64();
-    let prior = args.prior(&topics)?;
+    let belief = args.belief(&topics);
     timing.camera_s = start.elapsed().as_secs_f64() - timing.reading_s;
     fs::create_dir_all(&args.out).with_context(|| format!("cannot make {}", args.out.display()))?;
     let config = args.config();
@@ -232,29 +262,46 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
     let mut windows = Windows::default();
     for sequence in &sequences {
         let mut stages = progress.run(&config);
-        let mut result =
-            identify(sequence, &vehicle, prior, previous.as_ref(), &config, &mut |stage| stages.enter(stage))
-                .with_context(|| format!("cannot identify the tires from {}", args.bag().display()))?;
-        together::compare(args, &alone, &vehicle, &mut result)?;
+        let whole = args.bags.len() == 1 && sequences.len() == 1;
+        let found = floors::identified(
+            (sequence, whole),
+            &vehicle,
+            &|part| belief.of(part),
+            previous.as_ref(),
+            &config,
+            &mut |stage| stages.enter(stage),
+        )
+        .with_context(|| format!("cannot identify the tires from {}", args.bag().display()))?;
         timing.add(&stages.finish());
-        let writing = Instant::now();
-        let notes: Vec<String> = notes.iter().cloned().chain(signal_notes(&result.recorded)).collect();
-        let files = write(args, &vehicle, &notes, sequence, &result)?;
-        timing.writing_s += writing.elapsed().as_secs_f64();
-        windows.add(sequence, &result, previous.as_ref());
-        if result.replaces(previous.as_ref()) {
-            previous = result.accepted_set().or(previous);
+        windows.add_changes(&found.changes);
+        let parts = found.parts.len();
+        for (k, OnOneFloor { sequence, mut outcome }) in found.parts.into_iter().enumerate() {
+            together::compare(args, &alone, &vehicle, &mut outcome)?;
+            let writing = Instant::now();
+            let notes: Vec<String> = notes.iter().cloned().chain(signal_notes(&outcome.recorded)).collect();
+            let out = floors::folder(&args.out, k, parts)?;
+            let files = write(args, &out, &vehicle, &notes, &sequence, &outcome)?;
+            timing.writing_s += writing.elapsed().as_secs_f64();
+            windows.add(&sequence, &outcome, previous.as_ref());
+            if k + 1 < parts {
+                posterior::write(&out, &vehicle, &sequence, &outcome)?;
+            } else {
+                if outcome.replaces(previous.as_ref()) {
+                    previous = outcome.accepted_set().or(previous);
+                }
+                last = Some((sequence, outcome, files));
+                break;
+            }
         }
-        last = Some((result, files));
     }
+    let Some((sequence, result, mut files)) = last else {
+        bail!("{}: no state sequence", args.bag().display())
+    };
     let before = start.elapsed().as_secs_f64();
-    if let (Some((result, files)), Some(sequence)) = (&mut last, sequences.last()) {
-        files.extend(posterior::write(&args.out, &vehicle, sequence, result)?);
-    }
+    files.extend(posterior::write(&args.out, &vehicle, &sequence, &result)?);
     timing.total_s = start.elapsed().as_secs_f64();
     timing.posterior_s = timing.total_s - before;
-    let Some((result, mut files)) = last else { bail!("{}: no state sequence", args.bag().display()) };
-    if sequences.len() > 1 {
+    if windows.len() > 1 {
         files.push(windows.write(&args.out)?);
     }
     let timing_file = args.out.join("timing.json");
@@ -274,6 +321,7 @@ fn car_name(args: &IdentifyArgs, vehicle: &VehicleParameters) -> String {
 /// Everything but the times, which are not the result's.
 fn write(
     args: &IdentifyArgs,
+    out: &Path,
     vehicle: &VehicleParameters,
     notes: &[String],
     sequence: &StateSequence,
@@ -314,7 +362,7 @@ fn write(
     ];
     let mut files = Vec::new();
     for (name, text) in texts {
-        let path = args.out.join(name);
+        let path = out.join(name);
         fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
         files.push(path);
     }
@@ -325,7 +373,7 @@ fn write(
         floor: &args.floor,
         driven_mps: result.v_x_range_mps.high,
     };
-    files.extend(tire_files.write(&args.out)?);
+    files.extend(tire_files.write(out)?);
     if let Some(set) = result.provisional.filter(|_| result.status != Status::Provisional) {
         let provenance = Provenance {
             status: Status::Provisional,
@@ -334,7 +382,7 @@ fn write(
             ..provenance.clone()
         };
         let provisional = TireFiles { tires: &set.phi_p, provenance: &provenance, ..tire_files };
-        files.extend(provisional.write(&args.out)?);
+        files.extend(provisional.write(out)?);
     }
     Ok(files)
 }

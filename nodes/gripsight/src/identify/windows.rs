@@ -1,10 +1,10 @@
-//! One line a window: what was found, and when a change of the grip was noticed.
+//! One line a window, or a floor: what was found, and when a change of the grip was noticed.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use gripsight_identification::{AcceptedSet, Outcome, Reading};
+use gripsight_identification::{AcceptedSet, GripChange, Outcome, Reading};
 use gripsight_signals::{NS_PER_S, StateSequence};
 
 /// The windows of a run, in their order.
@@ -12,14 +12,29 @@ use gripsight_signals::{NS_PER_S, StateSequence};
 pub(super) struct Windows {
     /// Stamp of the first sample of all.
     start_ns: Option<i64>,
+    count: usize,
     lines: String,
     notices: String,
 }
 
 impl Windows {
+    /// Takes down where the grip changed within a drive.
+    pub(super) fn add_changes(&mut self, changes: &[GripChange]) {
+        for change in changes {
+            tracing::warn!("{change}");
+            let _ = writeln!(self.notices, "{change}; each floor is identified by itself");
+        }
+    }
+
+    /// How many there are.
+    pub(super) fn len(&self) -> usize {
+        self.count
+    }
+
     /// Takes down what a window gave, and whether the set in use before still fitted it.
     pub(super) fn add(&mut self, sequence: &StateSequence, result: &Outcome, set: Option<&AcceptedSet>) {
         let start_ns = *self.start_ns.get_or_insert(sequence.start_stamp_ns);
+        self.count += 1;
         let from_s = seconds(sequence.start_stamp_ns - start_ns);
         if let (Some(reading), Some(set)) = (&result.grip, set)
             && let Some(notice) = reading.notice(set)

@@ -82,11 +82,7 @@ fn changed_grip(run: &Identification, outcome: &Outcome, verdict: &mut Verdict) 
 /// A grip that changed under way: what was fitted is neither the one nor the other.
 fn one_floor(run: &Identification, verdict: &mut Verdict) {
     let Some(change) = &run.direct.grip_change else { return };
-    let (then, now) = (&change.before, &change.after);
-    verdict.against.push(format!(
-        "the grip changed {:.1} s after the start: D {:.2} -> {:.2} front, {:.2} -> {:.2} rear; one set is true on neither floor",
-        change.at_s, then.front.value, now.front.value, then.rear.value, now.rear.value
-    ));
+    verdict.against.push(format!("{change}; one set is true on neither floor"));
     verdict.drive.push(
         Manoeuvre::EachFloorByItself
             .because("identify what lies before the change and what lies after it, each by itself"),

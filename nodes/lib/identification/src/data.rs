@@ -37,7 +37,7 @@ pub(crate) struct Data {
 }
 
 /// Length of a window: several time constants of any car's lateral motion at speed.
-const WINDOW_S: f64 = 0.6;
+pub(crate) const WINDOW_S: f64 = 0.6;
 /// A window holds at least this many samples.
 const WINDOW_SAMPLES: usize = 12;
 /// Windows of one part lie together for this long, so that parts are not neighbours in everything.

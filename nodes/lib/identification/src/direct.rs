@@ -33,7 +33,7 @@ use crate::tires::{C_PRIOR, E_PRIOR, parameters};
 use crate::{FrictionPrior, IdentificationError, PerAxle, Range, SignalCorrections};
 use gripsight_estimation::shooting::{Fit, Parameter, Prior, Problem, StopReason, TOLERANCE, fit};
 
-pub(crate) use change::GripChange;
+pub use change::GripChange;
 pub(crate) use peak::{PeakEvidence, force_error};
 
 use change::change_within;

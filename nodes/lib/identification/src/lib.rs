@@ -14,6 +14,7 @@ mod envelope;
 mod error;
 pub mod export;
 mod extract;
+mod floors;
 mod grip;
 mod handling;
 mod judge;
@@ -37,9 +38,11 @@ pub use candidate::{
     AcceptedSet, Candidate, Estimate, FrictionPrior, PerAxle, Range, RunKey, SignalCorrections, vehicle_hash,
 };
 pub use config::{Config, Method, ResidualKind};
+pub use direct::GripChange;
 pub use drive_next::{DriveNext, Manoeuvre};
 pub use envelope::ValidWithin;
 pub use error::IdentificationError;
+pub use floors::{Floors, OnOneFloor, identify_floors};
 pub use grip::{GripLook, GripWatch};
 pub use handling::{Handling, HandlingPoint, understeer_rad};
 pub use live::{LiveResidual, LiveSample};

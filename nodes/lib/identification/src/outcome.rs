@@ -5,8 +5,8 @@ use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    AcceptedSet, Config, DriveNext, Estimate, FrictionPrior, Handling, Longitudinal, Nuisance, PerAxle,
-    Range, Reading, Recorded, RunKey, SignalCorrections, ValidWithin,
+    AcceptedSet, Config, DriveNext, Estimate, FrictionPrior, GripChange, Handling, Longitudinal, Nuisance,
+    PerAxle, Range, Reading, Recorded, RunKey, SignalCorrections, ValidWithin,
 };
 
 /// What a set may be used for.
@@ -305,6 +305,8 @@ pub struct Outcome {
     pub prior: Option<FrictionPrior>,
     /// Whether the previous set still fits; `None` without one.
     pub grip: Option<Reading>,
+    /// Where the grip changed under way, if it did.
+    pub grip_change: Option<GripChange>,
     /// Understeer gradient and handling diagram.
     pub handling: Handling,
     /// What the drive tells of the drive train.

@@ -129,7 +129,7 @@ impl Identification {
     }
 
     /// The same with the recording made ready.
-    fn start_on(
+    pub(crate) fn start_on(
         usable: &Usable,
         sequence: &StateSequence,
         vehicle: &VehicleParameters,
@@ -258,6 +258,29 @@ impl Identification {
         Ok(Next::Candidate(self.candidate.clone()))
     }
 
+    /// Takes all turns, learning the residual of each here.
+    pub(crate) fn finished(
+        mut self,
+        usable: &Usable,
+        progress: &mut dyn FnMut(Stage),
+    ) -> Result<Outcome, IdentificationError> {
+        let epochs_max = self.config.epochs_at_most();
+        loop {
+            let iteration = self.candidate.key.iteration + 1;
+            progress(Stage::Training { iteration, epoch: 0, epochs_max, loss: f64::NAN });
+            let model = train_on(usable, &self.vehicle, &self.candidate, &self.config, &mut |p| {
+                progress(Stage::Training { iteration, epoch: p.epoch, epochs_max, loss: p.validation_loss });
+                ControlFlow::Continue(())
+            })?;
+            progress(Stage::Sweeping { iteration });
+            let swept = self.sweep(&model)?;
+            progress(Stage::Fitting { iteration });
+            if let Next::Done(outcome) = self.advance(&swept)? {
+                return Ok(*outcome);
+            }
+        }
+    }
+
     fn check_answer(&self, key: &RunKey, same_tires: bool) -> Result<(), IdentificationError> {
         if self.ended {
             return Err(IdentificationError::Ended);
@@ -357,23 +380,8 @@ pub fn identify(
 ) -> Result<Outcome, IdentificationError> {
     progress(Stage::Preparing);
     let usable = Usable::of(sequence, vehicle)?;
-    let mut run = match Identification::start_on(&usable, sequence, vehicle, prior, previous, config)? {
-        Started::Running(run) => run,
-        Started::Refused(outcome) => return Ok(*outcome),
-    };
-    let epochs_max = config.epochs_at_most();
-    loop {
-        let iteration = run.candidate.key.iteration + 1;
-        progress(Stage::Training { iteration, epoch: 0, epochs_max, loss: f64::NAN });
-        let model = train_on(&usable, vehicle, &run.candidate, config, &mut |p| {
-            progress(Stage::Training { iteration, epoch: p.epoch, epochs_max, loss: p.validation_loss });
-            ControlFlow::Continue(())
-        })?;
-        progress(Stage::Sweeping { iteration });
-        let swept = run.sweep(&model)?;
-        progress(Stage::Fitting { iteration });
-        if let Next::Done(outcome) = run.advance(&swept)? {
-            return Ok(*outcome);
-        }
+    match Identification::start_on(&usable, sequence, vehicle, prior, previous, config)? {
+        Started::Running(run) => run.finished(&usable, progress),
+        Started::Refused(outcome) => Ok(*outcome),
     }
 }

@@ -40,13 +40,10 @@ pub struct Car<T> {
 /// What the inertia of the turning wheels adds to the mass along the road, as a share of it. Wong, Theory of Ground Vehicles, section 3.1: 1.04 and more.
 pub(crate) const TURNING_SHARE: f64 = 0.06;
 
-/// Track over wheelbase: 0.55 of long road cars to 0.8 of formula and 1:10 cars.
-const TRACK_SHARE: f64 = 0.7;
-
 /// Yaw inertia of the turning of the wheels. A wheel half a track t off the middle runs at v_x -+ r t/2: what of the mass they add along the road, they add
 /// to the yaw inertia at that lever, whatever moment yaw_inertia_kgm2 was measured with.
 pub(crate) fn wheels_kgm2(vehicle: &VehicleParameters) -> f64 {
-    let lever_m = 0.5 * TRACK_SHARE * vehicle.wheelbase_m();
+    let lever_m = 0.5 * vehicle.track_m();
     TURNING_SHARE * vehicle.mass_kg * lever_m * lever_m
 }
 

@@ -138,6 +138,7 @@ impl CarParameters {
             ("l_f_m", self.l_f_m),
             ("l_r_m", self.l_r_m),
             ("h_cg_m", self.h_cg_m),
+            ("track_width_m", self.track_width_m),
             ("drive_front_share", self.drive.drive_front_share),
             ("brake_front_share", self.drive.brake_front_share),
             ("max_steering_rad", self.max_steering_rad),

@@ -10,6 +10,7 @@
 mod align;
 mod channels;
 mod checks;
+mod cut;
 mod error;
 mod excitation;
 mod health;

@@ -10,6 +10,7 @@
 //!       l_f_m: 0.15      # centre of gravity to front axle
 //!       l_r_m: 0.17      # centre of gravity to rear axle
 //!       h_cg_m: 0.06
+//!       track_width_m: 0.25  # optional: middle of the left wheel to middle of the right one
 //!       sigma:           # optional: how well a figure is known, one standard deviation in its unit
 //!         mass_kg: 0.02
 //! ```
@@ -37,6 +38,9 @@ pub struct VehicleParameters {
     pub l_r_m: f64,
     /// Height of the centre of gravity.
     pub h_cg_m: f64,
+    /// Middle of the left wheel to middle of the right one, where stated ([`Self::track_m`]).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub track_width_m: Option<f64>,
     /// Share of the drive force at the front axle, where stated: 0 rear drive, 1 front drive ([`Self::front_drive_share`]).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drive_front_share: Option<f64>,
@@ -70,6 +74,9 @@ pub const FIGURES: [&str; 9] = [
 
 /// Wheelbase up to which a car is a model car.
 const MODEL_CAR_M: f64 = 1.0;
+
+/// Track over wheelbase: 0.55 of long road cars to 0.8 of formula and 1:10 cars.
+const USUAL_TRACK_SHARE: f64 = 0.7;
 
 /// A common lock of 1:10 cars; full-size cars have more and use less.
 fn default_max_steering_rad() -> f64 {
@@ -113,6 +120,7 @@ impl VehicleParameters {
             ("l_r_m", self.l_r_m),
             ("max_steering_rad", self.max_steering_rad),
             ("wheel_radius_m", self.wheel_radius_m.unwrap_or(1.0)),
+            ("track_width_m", self.track_m()),
         ];
         if let Some(&(name, got)) = positive.iter().find(|(_, v)| !(v.is_finite() && *v > 0.0)) {
             return Err(VehicleError::Parameter { name, got, must: "positive and finite" });
@@ -165,6 +173,12 @@ impl VehicleParameters {
         self.l_f_m + self.l_r_m
     }
 
+    /// Distance between the wheels of an axle; where it is not stated, what cars mostly have.
+    #[must_use]
+    pub fn track_m(&self) -> f64 {
+        self.track_width_m.unwrap_or(USUAL_TRACK_SHARE * self.wheelbase_m())
+    }
+
     /// A number that changes with any parameter: results carry it, so that they are not used with another car.
     #[must_use]
     pub fn hash(&self) -> u64 {
@@ -181,7 +195,8 @@ impl VehicleParameters {
         ];
         // FNV-1a over the bits: stable across builds, and nothing here needs to resist an attacker.
         numbers
-            .iter()
+            .into_iter()
+            .chain(self.track_width_m)
             .flat_map(|v| v.to_bits().to_le_bytes())
             .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
     }
@@ -196,6 +211,7 @@ impl VehicleParameters {
             l_f_m: 0.162,
             l_r_m: 0.145,
             h_cg_m: 0.06,
+            track_width_m: None,
             drive_front_share: None,
             brake_front_share: None,
             max_steering_rad: default_max_steering_rad(),

@@ -99,6 +99,7 @@ pub(crate) fn nominal(car: &CarParameters) -> VehicleParameters {
         l_f_m: car.l_f_m,
         l_r_m: car.l_r_m,
         h_cg_m: car.h_cg_m,
+        track_width_m: Some(car.track_width_m),
         drive_front_share: Some(car.drive.drive_front_share),
         brake_front_share: Some(car.drive.brake_front_share),
         max_steering_rad: car.max_steering_rad,

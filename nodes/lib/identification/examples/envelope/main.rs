@@ -5,6 +5,7 @@
 //! envelope bags FOLDER...                    bag folders, with `truth_axle_forces.csv` where a plant knows its forces
 //! envelope priors FROM TO DURATION_S         the same drives with friction priors off by -0.6 to 0.6, of any sigma
 //! envelope grip FROM TO                      drives whose grip falls, or does not, while the set found before is watched
+//! envelope floors FROM TO                    drives over two floors: what the set of each promises
 //! ```
 //!
 //! Writes a row a run to standard output (csv); `envelope.py` beside the results makes the tables of it. No truth is read by the product.
@@ -12,6 +13,7 @@
 #[allow(dead_code)]
 #[path = "../accuracy/cases.rs"]
 mod cases;
+mod floors;
 mod grip;
 #[allow(dead_code)]
 #[path = "../support/mod.rs"]
@@ -180,9 +182,12 @@ fn drawn(seed: u64, duration_s: f64) -> Result<(Run, PerAxle<Known>, f64, f64)> 
 
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let Some((mode, rest)) = arguments.split_first() else { bail!("draws, bags, priors or grip?") };
+    let Some((mode, rest)) = arguments.split_first() else { bail!("draws, bags, priors, grip or floors?") };
     if let ("grip", [from, to]) = (mode.as_str(), rest) {
         return grip::run(from.parse()?, to.parse()?);
+    }
+    if let ("floors", [from, to]) = (mode.as_str(), rest) {
+        return floors::run(from.parse()?, to.parse()?);
     }
     println!("{}", header());
     match (mode.as_str(), rest) {

@@ -4,9 +4,12 @@
 //! fit best counts. A floor changed there if an axle's D differs by more than its uncertainty and by more than what tires and models make of one floor, and
 //! if both sides came near their D: one that was not come near is the curve's form alone.
 
+use std::fmt;
+
 use gripsight_estimation::shooting::{Fit, Parameter, Problem, TOLERANCE, fit};
 use gripsight_model::Window;
 use gripsight_vehicle::GRAVITY_MPS2;
+use serde::Serialize;
 
 use super::{ROBUST_K, SPREAD};
 use crate::data::{Data, quantile};
@@ -31,14 +34,25 @@ const TURNED: f64 = 0.98;
 const D: [usize; 2] = [2, 6];
 
 /// A change of the grip within a run.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct GripChange {
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct GripChange {
     /// Since the start of the sequence.
-    pub(crate) at_s: f64,
+    pub at_s: f64,
     /// D before.
-    pub(crate) before: PerAxle<Estimate>,
+    pub before: PerAxle<Estimate>,
     /// D after.
-    pub(crate) after: PerAxle<Estimate>,
+    pub after: PerAxle<Estimate>,
+}
+
+impl fmt::Display for GripChange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (then, now) = (&self.before, &self.after);
+        write!(
+            f,
+            "the grip changed {:.1} s after the start: D {:.2} -> {:.2} front, {:.2} -> {:.2} rear",
+            self.at_s, then.front.value, now.front.value, then.rear.value, now.rear.value
+        )
+    }
 }
 
 /// The change of grip, if there was one. `parameters`: of the fit to all; `sigma`: what its residuals were divided by.

@@ -1,7 +1,10 @@
 //! A road whose friction changes while the car is watched.
 
-use gripsight_identification::{Config, Monitor, PerAxle, ResidualKind, Status, identify};
+use gripsight_identification::{
+    Config, Floors, FrictionPrior, Monitor, PerAxle, ResidualKind, Status, identify, identify_floors,
+};
 use gripsight_reference_car::Friction;
+use gripsight_signals::StateSequence;
 
 use crate::support::{drive, scenario, with_background};
 
@@ -60,6 +63,37 @@ fn two_floors_in_one_drive_are_not_averaged() {
         let one = on(mu, Friction::Uniform { mu }, pace);
         assert!(one.accepted, "{:?}", one.reasons);
     }
+}
+
+#[test]
+fn each_floor_of_a_drive_is_identified_by_itself() {
+    let config = Config { residual: ResidualKind::None, ..Config::default() };
+    let on = |friction| {
+        let drive_on = scenario("f1tenth", "esses", 0.4, 0.9, 2).friction(friction).duration(40.0);
+        let (_, sequence, vehicle) = drive(with_background(drive_on));
+        let prior = |part: &StateSequence| {
+            let mu =
+                if part.duration_s() < 30.0 && part.start_stamp_ns > 19_000_000_000 { 0.85 } else { 0.4 };
+            Some(FrictionPrior { mu, sigma: 0.1 })
+        };
+        identify_floors(&sequence, &vehicle, &prior, None, &config, &mut |_| {}).unwrap()
+    };
+    let Floors { parts, changes } =
+        on(Friction::Changing { mu: 0.4, mu_after: 0.85, at_s: 20.0, over_s: 1.0 });
+    let [change] = changes[..] else { panic!("{changes:?}") };
+    assert!((change.at_s - 20.0).abs() < 2.0, "{change}");
+    let [before, after] = &parts[..] else { panic!("{} parts", parts.len()) };
+    assert!(before.sequence.duration_s() < 20.5 && after.sequence.start_stamp_ns > 20_000_000_000);
+    for (part, mu) in [(before, 0.4), (after, 0.85)] {
+        let outcome = &part.outcome;
+        assert!(outcome.accepted && outcome.grip_change.is_none(), "{:?}", outcome.reasons);
+        assert_eq!(outcome.prior.map(|p| p.mu), Some(mu));
+        assert!(outcome.phi_p.front.d < mu && outcome.phi_p.rear.d < 1.05 * mu, "{:?}", outcome.phi_p);
+    }
+    assert!(after.outcome.found.front.d > 1.2 * before.outcome.found.front.d);
+
+    let same = on(Friction::Uniform { mu: 0.4 });
+    assert!(same.changes.is_empty() && same.parts.len() == 1);
 }
 
 #[test]
