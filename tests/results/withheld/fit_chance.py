@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""The chance that an effect which is left in the model is a cause: fits the coefficients `CHANCE` of nodes/lib/diagnosis/src/decisions.rs on
-development cases whose labels are open, scores every batch by a fit on the others, and writes development_effects.csv. Needs NumPy.
+"""The chance that an effect which is left in the model is a cause: fits the coefficients `CHANCE` and `RIVAL_LEAVES` of
+nodes/lib/diagnosis/src/decisions.rs on development cases whose labels are open, scores every batch by a fit on the others, and writes
+development_effects.csv. Needs NumPy.
 
     fit_chance.py LABELS VERDICTS [LABELS VERDICTS ...]      LABELS of `gripsight withheld make`, VERDICTS of `gripsight withheld diagnose`
     fit_chance.py                                            on development_effects.csv
@@ -17,13 +18,15 @@ from pathlib import Path
 import numpy as np
 
 TABLE = Path(__file__).with_name("development_effects.csv")
-HEAD = ["batch", "case", "kind", "effect", "cause", "needed_fraction", "size_over_half_width", "over_unexplained"]
+HEAD = ["batch", "case", "kind", "effect", "cause", "needed_fraction", "size_over_half_width", "over_unexplained", "untried"]
 # Size over half width at which it counts nothing, and what is as good as nothing.
 UNIT = 2.5
 LEAST = 0.1
 RIDGE = 0.1
+# Standard deviations in half the width of a 90 % interval.
+HALF_WIDTH = 1.645
 # Chance from which the verdict names an effect.
-NAMED = 0.6
+NAMED = 2 / 3
 LEAST_OVER_UNEXPLAINED = 0.5
 
 
@@ -40,7 +43,8 @@ def collected(batches):
                 over = effect["over_unexplained"]
                 signs = [effect["needed_fraction"], effect["size_over_half_width"], 1e3 if over is None else over]
                 name = Path(labels).stem
-                yield [name, case["case"], case["kind"], effect["name"], int(effect["name"] in causes), *(f"{s:.4g}" for s in signs)]
+                untried = len(set(effect["confused_with"]) & set(case["without"]))
+                yield [name, case["case"], case["kind"], effect["name"], int(effect["name"] in causes), *(f"{s:.4g}" for s in signs), untried]
 
 
 def signs(rows):
@@ -67,12 +71,32 @@ def told(name, chance, cause):
             print(f"    {low:.2f} to {min(high, 1.0):.2f}: {int(inside.sum())}, of these causes {np.mean(cause[inside]):.2f}")
 
 
+def rival_leaves(rows, weights):
+    """The share of an effect that a cause which is not among the candidates and does nearly the same leaves unexplained: the likeliest, and where its 90 %
+    interval begins. An effect beside such a rival has its chance, shared with it as `unasked` in decisions.rs says."""
+    rows = [row for row in rows if int(row[8]) > 0]
+    alone = 1 / (1 + np.exp(-signs(rows) @ weights))
+    cause = np.array([float(row[4]) for row in rows])
+    size, unexplained, untried = (np.array([float(row[i]) for row in rows]) for i in (6, 7, 8))
+    shares = np.arange(0.0, 0.5, 0.005)
+    losses = []
+    for share in shares:
+        log_ratio = -0.5 * (HALF_WIDTH * size) ** 2 * share * (share - 2 / unexplained)
+        chance = alone / (1 + untried * np.exp(np.minimum(log_ratio, 0)))
+        losses.append(-np.sum(np.log(np.where(cause > 0, chance, 1 - chance))))
+    losses = np.array(losses)
+    within = shares[losses <= losses.min() + 0.5 * HALF_WIDTH**2]
+    print(f"RIVAL_LEAVES: {within[0]:.3f} (likeliest {shares[losses.argmin()]:.3f}), {len(rows)} effects with such a rival, {int(cause.sum())} causes")
+
+
 def main():
     if len(sys.argv) > 1:
         rows = list(collected(zip(sys.argv[1::2], sys.argv[2::2])))
         with TABLE.open("w", newline="") as file:
             csv.writer(file, lineterminator="\n").writerows([HEAD, *rows])
-    rows = [row for row in list(csv.reader(TABLE.open()))[1:] if float(row[7]) >= LEAST_OVER_UNEXPLAINED]
+    all_rows = [row for row in list(csv.reader(TABLE.open()))[1:] if float(row[7]) >= LEAST_OVER_UNEXPLAINED]
+    # A rival that is not among the candidates may be the cause: what it takes is fitted by itself.
+    rows = [row for row in all_rows if int(row[8]) == 0]
     x, cause = signs(rows), np.array([float(row[4]) for row in rows])
     batch = np.array([row[0] for row in rows])
     for name in sorted(set(batch)):
@@ -80,6 +104,7 @@ def main():
         told(f"{name}, by a fit on the others", 1 / (1 + np.exp(-x[own] @ fitted(x[~own], cause[~own]))), cause[own])
     weights = fitted(x, cause)
     told("all, by their own fit", 1 / (1 + np.exp(-x @ weights)), cause)
+    rival_leaves(all_rows, weights)
     print("CHANCE:", ", ".join(f"{w:.2f}" for w in weights))
 
 

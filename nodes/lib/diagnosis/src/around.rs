@@ -544,4 +544,22 @@ mod tests {
             assert_eq!(around.stuck(&with_limit, &limited.values), None);
         });
     }
+
+    #[test]
+    fn a_fit_begins_anew_without_the_little_of_what_does_nearly_the_same() {
+        with_around(0.06, 1.0, |around, problem| {
+            let [nothing, with_lag] = [&[][..], &[EffectId::SteeringLag]].map(|e| configured(around, e));
+            let mut fit = around.by_rollouts_to_the_end(problem, &with_lag, None).unwrap();
+            let relaxation = around.columns.of_effect(EffectId::TireRelaxation).unwrap();
+            fit.values[relaxation.start] = 0.02;
+            let begin = around.without_alike(&with_lag, &fit).unwrap();
+            let absent = around.engine.absent(EffectId::TireRelaxation);
+            assert_eq!(begin.values[relaxation.clone()], absent);
+            let others = |c: &usize| !relaxation.contains(c);
+            assert!((0..begin.values.len()).filter(others).all(|c| begin.values[c] == fit.values[c]));
+            // Nothing of it, or no effect that it stands beside: nothing to begin anew from.
+            assert!(around.without_alike(&with_lag, &begin).is_none());
+            assert!(around.without_alike(&nothing, &fit).is_none());
+        });
+    }
 }

@@ -32,7 +32,7 @@ impl Statement {
     /// Chance that one of the candidates that do nearly the same is a cause: what is not among the candidates has its share.
     pub(crate) fn chance_of_candidates(&self) -> f64 {
         let tried = 1.0 + self.rivals.iter().map(|(_, ratio)| ratio).sum::<f64>();
-        self.chance_of_alike() * tried / (tried + self.untried as f64)
+        self.chance_of_alike() * tried / (tried + self.unasked())
     }
 
     /// Chance that the effect is a cause.
@@ -46,9 +46,14 @@ impl Statement {
         self.chance() * ratio
     }
 
-    /// What a chance is shared among: the effect, its rivals as they are likely, and what does nearly the same and nobody asked for, as likely as it.
+    /// Evidence for what does nearly the same and is not among the candidates, over that for the effect.
+    fn unasked(&self) -> f64 {
+        self.untried as f64 * decisions::unasked(self.size_over_half_width, self.over_unexplained)
+    }
+
+    /// What a chance is shared among: the effect, its rivals and what does nearly the same and nobody asked for, as they are likely.
     fn sharers(&self) -> f64 {
-        1.0 + self.untried as f64 + self.rivals.iter().map(|(_, ratio)| ratio).sum::<f64>()
+        1.0 + self.unasked() + self.rivals.iter().map(|(_, ratio)| ratio).sum::<f64>()
     }
 }
 
@@ -63,10 +68,10 @@ mod tests {
         let row = |line: &str| {
             let cells: Vec<&str> = line.split(',').collect();
             let number = |i: usize| cells[i].parse::<f64>().unwrap();
-            let [closes, size_over_half_width, over_unexplained] = [5, 6, 7].map(number);
+            let [closes, size_over_half_width, over_unexplained, untried] = [5, 6, 7, 8].map(number);
             let statement = Statement {
                 term: 0,
-                untried: 0,
+                untried: untried as usize,
                 rivals: Vec::new(),
                 held_out_log_ratio: 0.0,
                 size_over_half_width,
@@ -142,7 +147,14 @@ mod tests {
         assert!(beside.chance_instead(6) == 0.0);
         // One of the candidates it is; where nobody asked for another that does the same, less surely.
         assert!((beside.chance_of_candidates() - whole).abs() < 1e-12);
-        let unasked = Statement { untried: 1, ..beside };
-        assert!((unasked.chance_of_candidates() - whole * 2.5 / 3.5).abs() < 1e-12);
+        let weak = Statement { size_over_half_width: 0.5, ..beside.clone() };
+        let share = |s: &Statement| {
+            Statement { untried: 1, ..s.clone() }.chance_of_candidates() / s.chance_of_candidates()
+        };
+        approx::assert_relative_eq!(share(&weak), 2.5 / 3.5, max_relative = 0.01);
+        // What it would leave of a large effect would show, unless something like it does.
+        assert!(share(&beside) > 0.85, "{}", share(&beside));
+        let unexplained = Statement { over_unexplained: 5.0, ..beside };
+        approx::assert_relative_eq!(share(&unexplained), 2.5 / 3.5, max_relative = 1e-9);
     }
 }

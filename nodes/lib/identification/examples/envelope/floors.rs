@@ -1,9 +1,10 @@
-//! What sets of a drive over two floors promise, each beside the floor that it is for.
+//! What sets of a drive over two floors promise, each beside the floor that it is for. Drives of even seeds keep their pace where the floor changes; on those of
+//! odd seeds the driver stops for a moment and goes on at a pace for the new floor.
 
 use anyhow::Result;
 use gripsight_identification::{Config, Outcome, PerAxle, ResidualKind, identify, identify_floors};
 use gripsight_reference_car::Friction;
-use gripsight_signals::NS_PER_S;
+use gripsight_signals::{Joined, NS_PER_S};
 use gripsight_vehicle::MagicFormula;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -35,7 +36,12 @@ fn most_over(outcome: &Outcome, truth: &Truth) -> f64 {
 /// the same of one set for the whole drive, on the slipperier floor.
 pub(crate) fn run(from: u64, to: u64) -> Result<()> {
     let side = |name: &str| format!("status_{name},d_front_{name},d_rear_{name},over_{name}");
-    println!("run,mu,mu_after,pace,found_s,floors,{},{},{}", side("before"), side("after"), side("whole"));
+    println!(
+        "run,driver,mu,mu_after,pace,found_s,floors,{},{},{}",
+        side("before"),
+        side("after"),
+        side("whole")
+    );
     for seed in from..to {
         let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x00f1_0025);
         let ratio = RATIO.0 * (RATIO.1 / RATIO.0).powf(random.random_range(0.0..1.0));
@@ -43,23 +49,32 @@ pub(crate) fn run(from: u64, to: u64) -> Result<()> {
         let mut case = cases::draw(seed, DURATION_S)?;
         let mu = case.scenario.friction.nominal();
         let mu_after = ratio * mu;
-        let on = |mu_there: f64| {
-            let mut scenario = case.scenario.clone();
+        let adapts = seed % 2 == 1;
+        let driver = if adapts { "adapts" } else { "keeps" };
+        let on = |mu_there: f64, seed: u64| {
+            let mut scenario = case.scenario.clone().seed(seed).duration(DURATION_S / 2.0);
             scenario.friction = Friction::Uniform { mu: mu_there };
             scenario.driver.pace = share;
             let grip = [scenario.car.tire_front.grip, scenario.car.tire_rear.grip].map(|g| mu_there * g);
-            let (recording, _, vehicle) = reference::drive(scenario);
+            let (recording, sequence, vehicle) = reference::drive(scenario);
             let truth = truth_of(&recording, &vehicle);
-            anyhow::Ok([(floor(&truth.front)?.0, grip[0]), (floor(&truth.rear)?.0, grip[1])])
+            anyhow::Ok(([(floor(&truth.front)?.0, grip[0]), (floor(&truth.rear)?.0, grip[1])], sequence))
         };
-        let truths: [Truth; 2] = [on(mu)?, on(mu_after)?];
+        let ((first, before), (second, after)) = (on(mu, seed)?, on(mu_after, seed + 1)?);
+        let truths: [Truth; 2] = [first, second];
         case.scenario.friction = Friction::Changing { mu, mu_after, at_s: CHANGES_S, over_s: 0.2 };
-        let pace = share * ratio.min(1.0);
+        let pace = if adapts { share } else { share * ratio.min(1.0) };
         case.scenario.driver.pace = pace;
-        let (_, sequence, vehicle) = reference::drive(case.scenario);
+        let (_, mut sequence, vehicle) = reference::drive(case.scenario);
+        if adapts {
+            sequence = Joined::of(&[before, after])?.sequence;
+        }
         let config = Config { residual: ResidualKind::None, ..Config::default() };
         let Ok(found) = identify_floors(&sequence, &vehicle, &|_| None, None, &config, &mut |_| {}) else {
-            println!("{},{mu:.3},{mu_after:.3},{pace:.3},,0,failed,,,,failed,,,,failed,,,", case.name);
+            println!(
+                "{},{driver},{mu:.3},{mu_after:.3},{pace:.3},,0,failed,,,,failed,,,,failed,,,",
+                case.name
+            );
             continue;
         };
         let whole = identify(&sequence, &vehicle, None, None, &config, &mut |_| {})?;
@@ -88,7 +103,7 @@ pub(crate) fn run(from: u64, to: u64) -> Result<()> {
         };
         let found_s = found.changes.first().map_or(f64::NAN, |c| c.at_s);
         println!(
-            "{},{mu:.3},{mu_after:.3},{pace:.3},{found_s:.2},{},{},{},{}",
+            "{},{driver},{mu:.3},{mu_after:.3},{pace:.3},{found_s:.2},{},{},{},{}",
             case.name,
             parts.len(),
             of(true),
