@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use gripsight_identification::{
-    AcceptedSet, Config, Floors, FrictionPrior, IdentificationError, OnOneFloor, Stage, identify,
+    AcceptedSet, Config, Floors, FrictionPrior, IdentificationError, OnOneFloor, Outcome, Stage, identify,
     identify_floors,
 };
+use gripsight_report::status;
 use gripsight_signals::{NS_PER_S, StateSequence};
 use gripsight_vehicle::VehicleParameters;
 
@@ -30,13 +31,12 @@ pub(super) fn identified(
     let count = floors.parts.len();
     let changes = &floors.changes;
     for (k, part) in floors.parts.iter_mut().enumerate().filter(|_| count > 1) {
-        let from_s = (part.sequence.start_stamp_ns - sequence.start_stamp_ns) as f64 / NS_PER_S;
-        let to_s = from_s + part.sequence.duration_s();
         let near = [k.checked_sub(1).and_then(|k| changes.get(k)), changes.get(k)];
         let near: Vec<String> = near.into_iter().flatten().map(ToString::to_string).collect();
         let remark = format!(
-            "floor {} of {count}, {from_s:.1} to {to_s:.1} s of the drive: {}",
+            "floor {} of {count}, {} of the drive: {}",
             k + 1,
+            span(sequence, &part.sequence),
             near.join("; ")
         );
         part.outcome.reasons.insert(0, remark);
@@ -52,4 +52,23 @@ pub(super) fn folder(out: &Path, part: usize, parts: usize) -> anyhow::Result<Pa
     let folder = out.join(format!("floor_{}", part + 1));
     std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
     Ok(folder)
+}
+
+/// Which part of a drive it is: `0.0 to 23.4 s`.
+fn span(drive: &StateSequence, part: &StateSequence) -> String {
+    let from_s = (part.start_stamp_ns - drive.start_stamp_ns) as f64 / NS_PER_S;
+    format!("{from_s:.1} to {:.1} s", from_s + part.duration_s())
+}
+
+/// What the terminal says of a floor before the last one.
+pub(super) fn line(drive: &StateSequence, part: &StateSequence, outcome: &Outcome, folder: &Path) -> String {
+    let d = outcome.phi_p;
+    format!(
+        "floor of {}: {}, D {:.2} front, {:.2} rear: {}",
+        span(drive, part),
+        status(outcome),
+        d.front.d,
+        d.rear.d,
+        folder.display()
+    )
 }

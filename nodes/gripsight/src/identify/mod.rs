@@ -260,11 +260,11 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
     let progress = Progress::new();
     let mut last = None;
     let mut windows = Windows::default();
-    for sequence in &sequences {
+    for drive in &sequences {
         let mut stages = progress.run(&config);
         let whole = args.bags.len() == 1 && sequences.len() == 1;
         let found = floors::identified(
-            (sequence, whole),
+            (drive, whole),
             &vehicle,
             &|part| belief.of(part),
             previous.as_ref(),
@@ -285,6 +285,7 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
             windows.add(&sequence, &outcome, previous.as_ref());
             if k + 1 < parts {
                 posterior::write(&out, &vehicle, &sequence, &outcome)?;
+                windows.note(&floors::line(drive, &sequence, &outcome, &out));
             } else {
                 if outcome.replaces(previous.as_ref()) {
                     previous = outcome.accepted_set().or(previous);

@@ -26,6 +26,11 @@ impl Windows {
         }
     }
 
+    /// Adds a line to [`Self::notices`].
+    pub(super) fn note(&mut self, line: &str) {
+        let _ = writeln!(self.notices, "{line}");
+    }
+
     /// How many there are.
     pub(super) fn len(&self) -> usize {
         self.count
@@ -69,7 +74,7 @@ impl Windows {
         };
     }
 
-    /// When the grip was seen to have changed: a line each.
+    /// When the grip was seen to have changed, and what the floors before the last gave: a line each.
     pub(super) fn notices(&self) -> &str {
         &self.notices
     }
