@@ -106,6 +106,39 @@ def priors(title, data):
     return lines + [""]
 
 
+def floors(data):
+    driven = [r for r in data if r["status_whole"] != "failed"]
+    usable = lambda r, side: r[f"status_{side}"].startswith("accepted")
+    over = lambda r, side: usable(r, side) and number(r[f"over_{side}"]) > HARMFUL
+    lines = [
+        "### Two floors in one drive",
+        "",
+        "| driver | friction after over before | drives | cut in two | of these sets of before, after usable | promise more than 10 % too much: of before, of after | not cut: usable | promise more than 10 % of the slipperier floor's peak too much | in one piece: usable | too much |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    ranges = [(0.4, 0.6), (0.6, 0.8), (0.8, 1.25), (1.25, 1.6), (1.6, 2.1), (0.4, 2.1)]
+    for driver in ("adapts", "keeps"):
+        for low, high in ranges:
+            inside = [r for r in driven if r["driver"] == driver and low <= number(r["mu_after"]) / number(r["mu"]) < high]
+            cut = [r for r in inside if int(r["floors"]) > 1]
+            one = [r for r in inside if int(r["floors"]) == 1]
+            count = lambda test, rows: sum(test(r) for r in rows)
+            cells = [
+                driver,
+                f"{low} to {high}" if high - low < 1.5 else "all",
+                len(inside),
+                len(cut),
+                f"{count(lambda r: usable(r, 'before'), cut)}, {count(lambda r: usable(r, 'after'), cut)}",
+                f"{count(lambda r: over(r, 'before'), cut)}, {count(lambda r: over(r, 'after'), cut)}",
+                count(lambda r: usable(r, "after"), one),
+                count(lambda r: over(r, "after"), one),
+                count(lambda r: usable(r, "whole"), inside),
+                count(lambda r: over(r, "whole"), inside),
+            ]
+            lines.append("| " + " | ".join(map(str, cells)) + " |")
+    return lines + [""]
+
+
 def bags(data):
     lines = ["### Recordings and plants of others, bag by bag", "", "| bag | status | D promised front/rear | slips driven, deg | peak said | promises too much at most | promises too little |", "| --- | --- | --- | --- | --- | --- | --- |"]
     for r in data:
@@ -132,6 +165,9 @@ def main():
     data = rows("envelope_priors.csv")
     if data:
         text += priors("Wrong priors", data)
+    data = rows("envelope_floors.csv")
+    if data:
+        text += floors(data)
     data = rows("envelope_bags.csv") + rows("envelope_foreign.csv")
     if data:
         text += bags(data)

@@ -230,8 +230,15 @@ const LEVER: usize = SIGNALS + 3;
 const WORTH: f64 = 0.06;
 /// Lever arms that its fit starts from, on either side, in wheelbases.
 const LEVER_START: f64 = 0.2;
+/// Windows at most that a fit looks for where to begin with: a long drive's others are taken in once it is near.
+const SEARCH_WINDOWS: usize = 60;
 /// Normalised stiffness that fits start from.
 const FIRST_STIFFNESS: f64 = 8.0;
+
+/// Windows of a drive, evenly over it, of which there are not too many to search with.
+fn thinned(windows: &[Window]) -> Vec<Window> {
+    windows.iter().copied().step_by(windows.len().div_ceil(SEARCH_WINDOWS).max(1)).collect()
+}
 
 struct Fitter<'a> {
     model: TireRollout<'a>,
@@ -261,7 +268,7 @@ impl Fitter<'_> {
         delays_s: &[f64],
         below_mps2: f64,
     ) -> Result<(Fit, Weights), IdentificationError> {
-        let low = low_windows(self.data, &self.training, below_mps2);
+        let low = thinned(&low_windows(self.data, &self.training, below_mps2));
         let mut all = all.to_vec();
         for j in [1, 2, 3, 5, 6, 7, GAIN, LEVER] {
             all[j].free = false;
@@ -291,24 +298,25 @@ impl Fitter<'_> {
         for j in [GAIN, LEVER] {
             all[j].free = false;
         }
-        let mut found = self.solve(&all, &self.training, &weights.sigma, 15);
-        let mut weights = self::weights(&self.model, &found, &self.training, &self.data.noise);
+        let few = thinned(&self.training);
+        let mut found = self.solve(&all, &few, &weights.sigma, 15);
+        let mut weights = self::weights(&self.model, &found, &few, &self.data.noise);
         restart(&mut all, &found.parameters);
-        found = self.solve(&all, &self.training, &weights.sigma, 15);
+        found = self.solve(&all, &few, &weights.sigma, 15);
         // A lever arm that was taken for stiffness may have driven the tires to where no step leads back: start on either side, too.
         let mut freed = all.clone();
         restart(&mut freed, &found.parameters);
         for j in [GAIN, LEVER] {
             freed[j].free = true;
         }
-        let mut best = self.solve(&freed, &self.training, &weights.sigma, 15);
+        let mut best = self.solve(&freed, &few, &weights.sigma, 15);
         for share in [-LEVER_START, LEVER_START] {
             for axle in [0, 4] {
                 (freed[axle].start, freed[axle + 1].start) = (FIRST_STIFFNESS, C_PRIOR.mean);
                 freed[axle + 3].start = E_PRIOR.mean;
             }
             freed[LEVER].start = share * self.model.vehicle.wheelbase_m();
-            let other = self.solve(&freed, &self.training, &weights.sigma, 15);
+            let other = self.solve(&freed, &few, &weights.sigma, 15);
             if other.linearization.cost < best.linearization.cost {
                 best = other;
             }
@@ -319,8 +327,8 @@ impl Fitter<'_> {
         } else {
             shift = std::array::from_fn(|j| best.parameters[j] - found.parameters[j]);
         }
-        for _ in 0..2 {
-            weights = self::weights(&self.model, &found, &self.training, &self.data.noise);
+        for fitted in [&few, &self.training] {
+            weights = self::weights(&self.model, &found, fitted, &self.data.noise);
             restart(&mut all, &found.parameters);
             found = self.solve(&all, &self.training, &weights.sigma, 15);
         }

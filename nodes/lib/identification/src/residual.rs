@@ -29,6 +29,10 @@ use crate::{
 const RESIDUAL_WINDOW_S: f64 = 0.2;
 /// Finest time step of the robust residual: what is learned is slower.
 const RESIDUAL_STEP_S: f64 = 0.02;
+/// Its coarsest step: a quarter of a window.
+const COARSEST_STEP_S: f64 = 0.05;
+/// Residuals that a network is trained on, at most, where the step can be coarser: those of a minute at the finest step.
+const MOST_SAMPLES: usize = 3000;
 
 /// Width of the means that take the noise out of the paper's residual: 3 dB less at about 3 Hz (ForzaETH: 2.5 Hz).
 const SMOOTHING_S: f64 = 0.1;
@@ -296,7 +300,7 @@ fn disturbances(
     vehicle: &VehicleParameters,
     candidate: &Candidate,
 ) -> (Vec<Stretch>, f64, usize) {
-    let stride = (RESIDUAL_STEP_S / data.dt_s).round().max(1.0) as usize;
+    let stride = residual_stride(data);
     let half = (0.5 * RESIDUAL_WINDOW_S / data.dt_s).round().max(3.0) as usize;
     let dt_s = stride as f64 * data.dt_s;
     let tires = PacejkaParameters { front: lift(&candidate.phi_p.front), rear: lift(&candidate.phi_p.rear) };
@@ -321,6 +325,14 @@ fn disturbances(
     };
     let stretches = data.stretches.iter().map(stretch).filter(|s: &Stretch| !s.is_empty()).collect();
     (stretches, dt_s, (2 * half).div_ceil(stride))
+}
+
+/// Samples from one residual to the next: the finest step, and on a long drive a coarser one, which makes no more of them than a minute has.
+fn residual_stride(data: &Data) -> usize {
+    let finest = (RESIDUAL_STEP_S / data.dt_s).round().max(1.0) as usize;
+    let samples: usize = data.stretches.iter().map(|s| s.len).sum();
+    let coarsest = (COARSEST_STEP_S / data.dt_s).round() as usize;
+    samples.div_ceil(MOST_SAMPLES).min(coarsest).max(finest)
 }
 
 /// Derivatives by the start state and the disturbance.

@@ -11,7 +11,7 @@ use gripsight_model::Window;
 use gripsight_vehicle::GRAVITY_MPS2;
 use serde::Serialize;
 
-use super::{ROBUST_K, SPREAD};
+use super::{ROBUST_K, SEARCH_WINDOWS, SPREAD, thinned};
 use crate::data::{Data, quantile};
 use crate::rollout::TireRollout;
 use crate::tires::D_BOUNDS;
@@ -76,21 +76,28 @@ pub(super) fn change_within(
         fit(&problem, None)
     };
     let solve = |windows: &[Window]| run(parameters, windows, true);
+    // A long drive's coarse place shows in some of its windows.
+    let every = windows.len().div_ceil(SEARCH_WINDOWS).max(1);
+    let few = thinned(&windows);
     let costs = |at: &[f64]| run(at, &windows, false).linearization.window_costs;
-    let sides = |place: usize| (solve(&windows[..place]), solve(&windows[place..]));
+    let sides = |windows: &[Window], place: usize| (solve(&windows[..place]), solve(&windows[place..]));
     let last = windows.len().checked_sub(LEAST_WINDOWS)?;
     let places = (1..PARTS).map(|k| k * windows.len() / PARTS).filter(|k| (LEAST_WINDOWS..=last).contains(k));
     let cost = |(_, (a, b)): &(usize, (Fit, Fit))| a.linearization.cost + b.linearization.cost;
-    let first = places.map(|place| (place, sides(place))).min_by(|a, b| cost(a).total_cmp(&cost(b)))?;
+    let coarse = places.map(|place| (place, sides(&few, place.div_ceil(every))));
+    let first = coarse.min_by(|a, b| cost(a).total_cmp(&cost(b)))?;
     // The coarse place mixes both floors on one side: from there to where each window fits better with the other side's D.
     let (mut place, (mut before, mut after)) = first;
+    if every > 1 {
+        (before, after) = sides(&windows, place);
+    }
     for _ in 0..REFINED {
         let better = between(&costs(&before.parameters), &costs(&after.parameters), last)?;
         if better == place {
             break;
         }
         place = better;
-        (before, after) = sides(place);
+        (before, after) = sides(&windows, place);
     }
     // As a share of the smaller D; a D on its bound is not known.
     let share = |j: usize| {
