@@ -54,6 +54,7 @@ mod tire_wear;
 mod v_x_scale;
 mod v_y_bias;
 mod v_y_lever_arm;
+mod v_y_roll_rate;
 mod yaw_inertia_error;
 
 use gripsight_vehicle::{Real, VehicleParameters};
@@ -243,6 +244,7 @@ library! {
     ComplianceSteer = compliance_steer::ComplianceSteer,
     RollSteer = roll_steer::RollSteer,
     DifferentialYawMoment = differential_yaw_moment::DifferentialYawMoment,
+    VyRollRate = v_y_roll_rate::VyRollRate,
     VyLeverArm = v_y_lever_arm::VyLeverArm,
     VyBias = v_y_bias::VyBias,
     OdometryDelay = odometry_delay::OdometryDelay,
@@ -390,10 +392,11 @@ mod tests {
         assert_eq!(usual(EffectId::LongitudinalLoadTransfer), Some(0.33 * 0.1));
         assert_eq!(usual(EffectId::YawInertiaError), Some(0.67 * 2.0));
         assert_eq!(usual(EffectId::OuterWheelMoment), Some(2.0));
+        assert_eq!(usual(EffectId::VyRollRate), Some(2.0));
         assert_eq!(usual(EffectId::GyroScale), None);
         let stated = VehicleParameters { drive_front_share: Some(0.5), ..car };
         assert_eq!(EffectId::DriveSplit.usual(&stated, 0.1), Some(0.03));
         assert_eq!(EffectId::BrakeSplit.usual(&stated, 0.1), Some(0.3));
-        assert_eq!(EffectId::background().count(), 8);
+        assert_eq!(EffectId::background().count(), 9);
     }
 }
