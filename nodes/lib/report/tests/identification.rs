@@ -124,6 +124,7 @@ fn outcome() -> Outcome {
         },
         prior: Some(FrictionPrior { mu: 0.6, sigma: 0.1 }),
         grip: None,
+        grip_change: None,
         handling: Handling {
             understeer_gradient_rad_per_mps2: estimate(0.004, 0.001),
             up_to_a_y_mps2: 2.3,
