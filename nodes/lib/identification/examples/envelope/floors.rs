@@ -84,20 +84,14 @@ pub(crate) fn run(from: u64, to: u64) -> Result<()> {
             format!("{status},{front:.3},{rear:.3},{:.4}", most_over(outcome, truth))
         };
         let parts = &found.parts;
-        // A part that ends before the change, or begins after it, lies on one floor; a whole drive is held against the slipperier.
+        // A part is for the floor that its middle is on; a whole drive is held against the slipperier.
         let slipperier = usize::from(mu_after < mu);
         let of = |first: bool| {
             let part = if first { parts.first() } else { parts.last() };
             part.map_or(String::new(), |part| {
                 let from_s = (part.sequence.start_stamp_ns - sequence.start_stamp_ns) as f64 / NS_PER_S;
-                let to_s = from_s + part.sequence.duration_s();
-                let on = if to_s <= CHANGES_S + 1.0 {
-                    0
-                } else if from_s >= CHANGES_S - 1.0 {
-                    1
-                } else {
-                    slipperier
-                };
+                let middle_s = from_s + 0.5 * part.sequence.duration_s();
+                let on = if parts.len() > 1 { usize::from(middle_s > CHANGES_S) } else { slipperier };
                 cells(&part.outcome, &truths[on])
             })
         };
