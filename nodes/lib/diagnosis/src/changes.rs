@@ -225,6 +225,17 @@ impl Compared {
         told.take(effect.sizing()).enumerate().max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
+    /// Which terms differ in the most probable comparison.
+    pub(crate) fn changed(&self) -> Vec<bool> {
+        self.selection.best[self.terms..2 * self.terms].iter().map(|&c| c > 0).collect()
+    }
+
+    /// Parameters of the later drive there.
+    pub(crate) fn later_values(&self, earlier: &Inferred) -> Vec<f64> {
+        let (n, step) = (earlier.values.len(), &self.selection.best_step);
+        (0..n).map(|c| earlier.values[c] + step[c] + step[n + c]).collect()
+    }
+
     /// Probability that the tires differ.
     pub(crate) fn of_tires(&self) -> f64 {
         self.probability(0)

@@ -145,10 +145,9 @@ pub(crate) fn explain(
             (found.ok_or(GapError::NotFinite)?, None)
         }
         Some(earlier) => {
-            progress("comparing the drives");
             let (later, differences) = earlier.with_later(&recording, request.vehicle, &windows, progress)?;
             engine.sigma.clone_from(&later.sigma);
-            (later, Some((earlier, differences)))
+            (later, Some(differences))
         }
     };
     progress("fitting on all training blocks");
@@ -157,11 +156,11 @@ pub(crate) fn explain(
     // What rollouts of held-out data speak against is not named, and the rest fitted without it.
     let (model, steps, candidates) = loop {
         let (named, candidates) = match &differences {
-            Some((_, differences)) => (differences.accepted.clone(), differences.candidates()),
+            Some(differences) => (differences.accepted.clone(), differences.candidates()),
             None => (inferred.modelled(), inferred.candidates()),
         };
         let size = |effect: &EffectId| match &differences {
-            Some((earlier, differences)) => differences.size(earlier, *effect).0,
+            Some(differences) => differences.size(*effect).0,
             None => inferred.size(*effect).0,
         };
         let model = if named.is_empty() {
@@ -180,7 +179,7 @@ pub(crate) fn explain(
             break (model, steps, candidates);
         };
         match &mut differences {
-            Some((_, differences)) => differences.refute(effect),
+            Some(differences) => differences.refute(effect),
             None => inferred.refute(effect),
         }
     };
@@ -189,7 +188,7 @@ pub(crate) fn explain(
         Models { nominal: &nominal, null: &null, state: &model, steps: &steps, candidates: &candidates };
     let budget = Budget::of(&engine, &scorer, &windows, &models);
     let (verdict, mut reasons) = match &differences {
-        Some((_, differences)) => (differences.verdict(), errors(&budget, model.named.is_empty())),
+        Some(differences) => (differences.verdict(), errors(&budget, model.named.is_empty())),
         None => decide(&budget, &inferred, &library),
     };
     // What cannot be right comes right after the errors: it explains more than any effect.
@@ -201,7 +200,7 @@ pub(crate) fn explain(
     reasons.extend(request.earlier.map(Earlier::text));
     reasons.extend(noise::caveat(&recording));
     let effects = match &differences {
-        Some((earlier, differences)) => differences.ranked(earlier, &engine, &budget),
+        Some(differences) => differences.ranked(&engine, &budget),
         None => ranked(&engine, &inferred, &library, &budget),
     };
     let scored_windows =
@@ -228,7 +227,7 @@ pub(crate) fn explain(
         drive_next: [drive_next(&effects), record_next(verdict, &invisible)].concat(),
         sites: sites(&inferred, &effects),
         effects,
-        changes: differences.map(|(_, d)| d.changes).unwrap_or_default(),
+        changes: differences.map(|d| d.changes).unwrap_or_default(),
         drives: request.together.map_or_else(Vec::new, |t| drives::errors(&t, &scorer, &null, &model)),
         invisible,
         detection_limits: detection_limits(&engine, &inferred),

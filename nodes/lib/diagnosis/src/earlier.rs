@@ -2,23 +2,26 @@
 
 use gripsight_estimation::Split;
 use gripsight_estimation::selection::Term;
-use gripsight_model::{EffectId, Flexible, Recording, Site};
+use gripsight_model::{EffectId, Recording};
 use gripsight_signals::DataHealth;
 use gripsight_vehicle::VehicleParameters;
 
 use crate::answer::Change;
-use crate::budget::{Budget, Scorer, large_slip_rad};
+use crate::budget::Budget;
 use crate::changes::{Compared, compare};
 use crate::decisions;
-use crate::diagnose::{SEARCH_WINDOWS, explain, fitted_null};
+use crate::diagnose::{SEARCH_WINDOWS, explain};
 use crate::engine::Engine;
-use crate::infer::{infer, linearised};
+use crate::infer::linearised;
 use crate::inferred::Inferred;
 use crate::outcome::{Diagnosis, RankedEffect};
 use crate::sizes::{Sized, reported};
 use crate::trust::TireTrust;
-use crate::usable::usable;
+use crate::usable::{Usable, usable};
 use crate::{GapError, Request, Verdict};
+
+/// Times at most that a later drive is linearised anew, around what has changed.
+const AROUND_CHANGES: usize = 3;
 
 /// A drive from before with its own diagnosis. A later drive is compared with all that was found in it: tires, effects, and what they left.
 #[derive(Debug, Clone)]
@@ -26,7 +29,7 @@ pub struct Earlier {
     /// What it was explained with.
     pub diagnosis: Diagnosis,
     pub(crate) inferred: Inferred,
-    recording: Recording,
+    usable: Usable,
 }
 
 impl Earlier {
@@ -37,12 +40,11 @@ impl Earlier {
     pub fn diagnosed(request: &Request<'_>, progress: &mut dyn FnMut(&str)) -> Result<Self, GapError> {
         let data_health = DataHealth::of(request.sequence)?;
         let usable = usable(request, &data_health).map_err(|e| GapError::Earlier(e.to_string()))?;
-        let recording = usable.recording.clone();
-        let (diagnosis, inferred) = explain(request, usable, data_health, progress)?;
+        let (diagnosis, inferred) = explain(request, usable.clone(), data_health, progress)?;
         if diagnosis.verdict == Verdict::NotIdentifiable {
             return Err(GapError::Earlier(diagnosis.reasons.join("; ")));
         }
-        Ok(Self { diagnosis, inferred, recording })
+        Ok(Self { diagnosis, inferred, usable })
     }
 
     /// What it was explained with, in words.
@@ -56,11 +58,12 @@ impl Earlier {
 
     /// Whether another recording holds the same signals.
     pub(crate) fn matches(&self, later: &Recording) -> bool {
-        self.recording.channels == later.channels && self.recording.has_command == later.has_command
+        let own = &self.usable.recording;
+        own.channels == later.channels && own.has_command == later.has_command
     }
 
-    /// Compares another drive of the car with it: both in the same columns, around the same tires, with nothing held. Gives the other drive, linearised
-    /// there, and what differs.
+    /// Compares another drive of the car with it: both in the same columns, around the same tires, with nothing held, and linearised in the same way, so that a
+    /// drive differs from itself by nothing. Gives the other drive, linearised there, and what differs.
     pub(crate) fn with_later(
         &self,
         recording: &Recording,
@@ -68,74 +71,77 @@ impl Earlier {
         windows: &Split,
         progress: &mut dyn FnMut(&str),
     ) -> Result<(Inferred, Differences), GapError> {
-        let own = self.explained(recording, vehicle, windows, progress);
-        let windows = windows.training.thinned(SEARCH_WINDOWS);
+        progress("comparing the drives");
         let like = &self.inferred;
-        let mut engine = Engine::new(recording, vehicle, like.tires, TireTrust::file());
-        let mut at = |place: (&[f64], &[usize]), fitted: bool| {
-            let later = linearised(&mut engine, like, place, fitted, &windows)?;
-            let differences = self.compared(&engine, &later)?;
-            Some((later, differences))
-        };
-        // Where the earlier drive was linearised, and where its model is fitted to the later one: fits may end apart although nothing has changed. Where the
+        let engine = |of| Engine::new(of, vehicle, like.tires, TireTrust::file());
+        let (mut before, mut after) = (engine(&self.usable.recording), engine(recording));
+        let [here, there] = [&self.usable.windows, windows].map(|w| w.training.thinned(SEARCH_WINDOWS));
+        // Where the earlier drive was linearised, and where its model is fitted to either drive: fits may end apart although nothing has changed. Where the
         // drives contradict each other the least they are compared at their best. A place that the model runs away from tells nothing.
-        let earlier = (&like.values[..], &like.chosen[..]);
-        let [here, refitted] = [at(earlier, false), at(earlier, true)];
-        let contradiction = |place: &(Inferred, Differences)| place.1.compared.dispersion;
-        let alike = [here, refitted]
-            .into_iter()
-            .flatten()
-            .min_by(|a, b| contradiction(a).total_cmp(&contradiction(b)));
-        // But where the later drive needs terms that the earlier one's model lacks it is far from anything that tells what has changed, and is linearised around
-        // a model of its own: where that is likelier, by what either place leaves of the later drive and what the drives contradict each other by.
-        let own = own.map(|own| like.model_of(&own)).and_then(|(values, chosen)| {
-            let own = at((&values, &chosen), true)?;
-            let likelier = alike.as_ref().is_none_or(|alike| {
-                let gained = (alike.0.weighed.cost - own.0.weighed.cost) / own.0.dispersion;
-                let contradicts = (contradiction(&own) / contradiction(alike)).ln() * values.len() as f64;
-                gained > contradiction(alike) * (price(&own.0.terms, &like.chosen, &chosen) + contradicts)
-            });
-            likelier.then_some(own)
-        });
-        own.or(alike).ok_or(GapError::NotFinite)
+        let mut at = |fitted: bool| {
+            let model = (&like.values[..], &like.chosen[..]);
+            let earlier = linearised(&mut before, like, model, fitted, &here)?;
+            let earlier = Inferred { chosen: like.chosen.clone(), sizes: like.sizes.clone(), ..earlier };
+            let later = linearised(&mut after, like, model, fitted, &there)?;
+            Pair::of(&before, earlier, later, like.chosen.clone())
+        };
+        let alike = [at(false), at(true)].into_iter().flatten();
+        let least = alike.min_by(|a, b| a.compared.dispersion.total_cmp(&b.compared.dispersion));
+        let mut best = least.ok_or(GapError::NotFinite)?;
+        // A later drive that needs terms which the earlier one's model lacks is far from anything that tells how large they are: it is linearised anew, around
+        // that model with what has changed, as long as this is likelier.
+        for _ in 0..AROUND_CHANGES {
+            let Some((values, chosen)) = best.later_model() else { break };
+            let anew = linearised(&mut after, like, (&values, &chosen), true, &there);
+            let anew = anew.and_then(|later| Pair::of(&before, best.earlier.clone(), later, chosen));
+            match anew.filter(|anew| anew.is_likelier(&best)) {
+                Some(anew) => best = anew,
+                None => break,
+            }
+        }
+        let Pair { earlier, later, compared, .. } = best;
+        Ok((later, Differences::of(earlier, compared)))
+    }
+}
+
+/// Two drives in the same columns, and what differs.
+struct Pair {
+    earlier: Inferred,
+    later: Inferred,
+    /// The terms of the model that the later one was linearised around.
+    around: Vec<usize>,
+    compared: Compared,
+}
+
+impl Pair {
+    fn of(engine: &Engine<'_>, earlier: Inferred, later: Inferred, around: Vec<usize>) -> Option<Self> {
+        let compared = compare(engine, &earlier, &later)?;
+        Some(Self { earlier, later, around, compared })
     }
 
-    /// What the inference makes of another drive by itself, from this one's model on.
-    fn explained(
-        &self,
-        recording: &Recording,
-        vehicle: &VehicleParameters,
-        windows: &Split,
-        progress: &mut dyn FnMut(&str),
-    ) -> Option<Inferred> {
-        let model = &self.diagnosis.extended_model;
-        let mut engine = Engine::new(recording, vehicle, model.tires, TireTrust::drive());
-        (engine.held, engine.usual) = model.parameters().ok()?;
-        let search = windows.training.thinned(SEARCH_WINDOWS);
-        let null = fitted_null(&engine, &search).ok()?;
-        let slip_rad = large_slip_rad(&engine, &search);
-        let flexible = Flexible::new(recording, slip_rad, vehicle.wheelbase_m(), &Site::ALL);
-        let scorer = Scorer::new(&engine.clone(), None, windows);
-        let effects = self.inferred.columns.effects.iter().copied();
-        let library: Vec<EffectId> = effects.filter(|e| self.inferred.is_open(*e)).collect();
-        infer(&mut engine, &null, &library, flexible, &search, &scorer, progress)
+    /// The later drive's model with all that differs, where it was linearised around one that lacks something of it.
+    fn later_model(&self) -> Option<(Vec<f64>, Vec<usize>)> {
+        let changed = self.compared.changed();
+        let chosen: Vec<usize> =
+            self.around.iter().zip(&changed).map(|(a, c)| usize::from(*a > 0 || *c)).collect();
+        let mut values = self.later.values.clone();
+        let after = self.compared.later_values(&self.earlier);
+        for (of, _) in self.later.terms.iter().zip(&changed).filter(|(_, changed)| **changed) {
+            let columns = of.from..of.from + of.priors.len();
+            values[columns.clone()].copy_from_slice(&after[columns]);
+        }
+        (chosen != self.around).then_some((values, chosen))
     }
 
-    /// What differs in a later drive that was linearised in the same columns.
-    fn compared(&self, later: &Engine<'_>, inferred: &Inferred) -> Option<Differences> {
-        let engine = Engine::new(&self.recording, later.vehicle, self.inferred.tires, TireTrust::drive());
-        let compared = compare(&engine, &self.inferred, inferred)?;
-        let changes = compared.changes(&self.inferred);
-        let stands_out =
-            |e: &EffectId| compared.standing_out(&self.inferred, *e).is_some_and(|(_, told)| told > 1.0);
-        let mut accepted: Vec<EffectId> = changes
-            .iter()
-            .filter(|c| c.probability >= decisions::LIKELY)
-            .filter_map(|c| EffectId::by_name(c.name))
-            .filter(stands_out)
-            .collect();
-        accepted.dedup();
-        Some(Differences { compared, changes, accepted })
+    /// Whether the later drive is likelier to be of this model than of one with fewer terms, by what either leaves of it and what the drives contradict each
+    /// other by.
+    fn is_likelier(&self, simpler: &Self) -> bool {
+        let contradiction = |of: &Self| of.compared.dispersion;
+        let gained = (simpler.later.weighed.cost - self.later.weighed.cost) / self.later.dispersion;
+        let contradicts =
+            (contradiction(self) / contradiction(simpler)).ln() * self.later.values.len() as f64;
+        gained
+            > contradiction(simpler) * (price(&self.later.terms, &simpler.around, &self.around) + contradicts)
     }
 }
 
@@ -152,6 +158,8 @@ fn price(terms: &[Term], without: &[usize], with: &[usize]) -> f64 {
 /// What differs between two drives.
 #[derive(Debug, Clone)]
 pub(crate) struct Differences {
+    /// The earlier drive, linearised as the later one is.
+    earlier: Inferred,
     compared: Compared,
     pub(crate) changes: Vec<Change>,
     /// The effects that have changed, the likeliest first: likelier than not, and by an amount whose interval holds no zero.
@@ -159,6 +167,20 @@ pub(crate) struct Differences {
 }
 
 impl Differences {
+    fn of(earlier: Inferred, compared: Compared) -> Self {
+        let changes = compared.changes(&earlier);
+        let stands_out =
+            |e: &EffectId| compared.standing_out(&earlier, *e).is_some_and(|(_, told)| told > 1.0);
+        let mut accepted: Vec<EffectId> = changes
+            .iter()
+            .filter(|c| c.probability >= decisions::LIKELY)
+            .filter_map(|c| EffectId::by_name(c.name))
+            .filter(stands_out)
+            .collect();
+        accepted.dedup();
+        Self { earlier, compared, changes, accepted }
+    }
+
     /// The changes that are likelier than not.
     pub(crate) fn likely(self) -> Vec<Change> {
         let effect = |c: &Change| EffectId::by_name(c.name).is_none_or(|e| self.accepted.contains(&e));
@@ -171,32 +193,28 @@ impl Differences {
     }
 
     /// An effect's parameters in the later drive, with standard deviations of what the earlier drive has and of the differences together.
-    pub(crate) fn size(&self, earlier: &Earlier, effect: EffectId) -> Sized {
-        let before = self.compared.earlier(&earlier.inferred, effect).unwrap_or_default();
-        let (by, mut sigma) = self.compared.difference(&earlier.inferred, effect).unwrap_or_default();
-        let own = earlier.inferred.sizes.effect(&earlier.inferred.columns, effect);
+    pub(crate) fn size(&self, effect: EffectId) -> Sized {
+        let earlier = &self.earlier;
+        let before = self.compared.earlier(earlier, effect).unwrap_or_default();
+        let (by, mut sigma) = self.compared.difference(earlier, effect).unwrap_or_default();
+        let own = earlier.sizes.effect(&earlier.columns, effect);
         let own = own.map_or_else(Vec::new, |(_, sigma)| sigma);
         sigma.iter_mut().zip(own).for_each(|(s, own)| *s = s.hypot(own));
         (before.iter().zip(&by).map(|(b, d)| b + d).collect(), sigma)
     }
 
     /// The effects that have changed, then those that may have.
-    pub(crate) fn ranked(
-        &self,
-        earlier: &Earlier,
-        engine: &Engine<'_>,
-        budget: &Budget,
-    ) -> Vec<RankedEffect> {
+    pub(crate) fn ranked(&self, engine: &Engine<'_>, budget: &Budget) -> Vec<RankedEffect> {
         let of = |effect: EffectId| RankedEffect {
             name: effect.name(),
             accepted: self.accepted.contains(&effect),
-            parameters: reported(engine, effect, &self.size(earlier, effect)),
+            parameters: reported(engine, effect, &self.size(effect)),
             gap_closed_fraction: budget.closed_by(effect),
             needed_fraction: f64::NAN,
             held_out_log_ratio: f64::NAN,
             over_unexplained: f64::NAN,
             size_over_half_width: f64::NAN,
-            confidence: self.compared.of_effect(&earlier.inferred, effect),
+            confidence: self.compared.of_effect(&self.earlier, effect),
             confused_with: Vec::new(),
         };
         self.accepted.iter().copied().chain(self.candidates()).map(of).collect()

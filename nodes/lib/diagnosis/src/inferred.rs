@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use gripsight_estimation::selection::{Selection, Term};
-use gripsight_model::{BASE, EffectId, Site};
+use gripsight_model::{EffectId, Site};
 use gripsight_vehicle::OwnTires;
 
 use crate::columns::Columns;
@@ -90,28 +90,6 @@ impl Inferred {
         }
         let by_fit = self.term_of(effect).filter(|_| self.is_open(effect)).map_or(0.0, |t| self.confirmed[t]);
         if self.stated.is_some() { by_fit.min(decisions::NEEDLESS) } else { by_fit }
-    }
-
-    /// The model of another drive in these columns: its values, and the terms that it has. It was inferred from this one's model on: what this one has it has.
-    pub(crate) fn model_of(&self, other: &Self) -> (Vec<f64>, Vec<usize>) {
-        let (mut values, mut chosen) = (self.values.clone(), self.chosen.clone());
-        values[..BASE].copy_from_slice(&other.values[..BASE]);
-        let mut take = |(column, term): (Range<usize>, usize), from: (Range<usize>, usize)| {
-            values[column].copy_from_slice(&other.values[from.0]);
-            chosen[term] = chosen[term].max(usize::from(other.chosen[from.1] > 0));
-        };
-        for &effect in &self.columns.effects {
-            let place = |of: &Self| Some((of.columns.of_effect(effect)?, of.term_of(effect)?));
-            if let (Some(here), Some(there)) = (place(self), place(other)) {
-                take(here, there);
-            }
-        }
-        let flexible = |of: &Self| of.columns.first_flexible()..of.columns.len();
-        for (here, there) in flexible(self).zip(flexible(other)) {
-            let place = |of: &Self, column: usize| (column..column + 1, of.columns.term_of_flexible(column));
-            take(place(self, here), place(other, there));
-        }
-        (values, chosen)
     }
 
     /// What is stated of an effect, if it is in the model.
