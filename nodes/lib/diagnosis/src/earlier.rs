@@ -122,11 +122,11 @@ impl Pair {
     /// The later drive's model with all that differs, where it was linearised around one that lacks something of it.
     fn later_model(&self) -> Option<(Vec<f64>, Vec<usize>)> {
         let changed = self.compared.changed();
-        let chosen: Vec<usize> =
-            self.around.iter().zip(&changed).map(|(a, c)| usize::from(*a > 0 || *c)).collect();
-        let mut values = self.later.values.clone();
+        let (mut chosen, mut values) = (self.around.clone(), self.later.values.clone());
         let after = self.compared.later_values(&self.earlier);
-        for (of, _) in self.later.terms.iter().zip(&changed).filter(|(_, changed)| **changed) {
+        for (t, of) in self.later.terms.iter().enumerate().filter(|(t, _)| changed[*t]) {
+            // Tires are in every model, changed or not.
+            chosen[t] = of.log_weights.len() - 1;
             let columns = of.from..of.from + of.priors.len();
             values[columns.clone()].copy_from_slice(&after[columns]);
         }

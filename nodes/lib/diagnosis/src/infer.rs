@@ -21,7 +21,7 @@ use crate::inferred::Inferred;
 use crate::joint::{Joint, Weighed};
 use crate::sizes::{Sizes, told};
 use crate::state::State;
-use crate::stated::Stated;
+use crate::stated::{Fits, Stated};
 use gripsight_estimation::Windows;
 use gripsight_estimation::selection::{Quadratic, Term, configuration, select};
 use gripsight_model::BASE;
@@ -126,7 +126,8 @@ pub(crate) fn infer(
         if (same && open_flexible && rounds > NOISE_ROUNDS) || last {
             let confirmed = around.confirmed(&weighed.total, &selection, &losses)?;
             progress("asking data that nothing was fitted to");
-            let mut found = around.stated(&weighed, (best, fitted), closed, scorer)?;
+            let fits = Fits::default();
+            let mut found = around.stated(&weighed, (best, fitted), closed, scorer, &fits)?;
             let mut sizes = Sizes::of(&around, library, &found.chosen, &found.fitted, windows)?;
             // What is left is another model than the one that everything was linearised around.
             let mut linearised = chosen;
@@ -135,7 +136,8 @@ pub(crate) fn infer(
                     break;
                 }
                 linearised = Some(found.chosen.clone());
-                (found, sizes) = again(engine, &columns, library, windows, dispersion, scorer, found)?;
+                (found, sizes) =
+                    again(engine, &columns, library, windows, dispersion, (scorer, &fits), found)?;
             }
             let Stated { chosen: best, statements: mut stated, .. } = found;
             for statement in &mut stated {
@@ -176,7 +178,7 @@ fn again(
     library: &[EffectId],
     windows: &Windows,
     dispersion: f64,
-    scorer: &Scorer<'_>,
+    (scorer, fits): (&Scorer<'_>, &Fits),
     Stated { chosen, fitted, .. }: Stated,
 ) -> Option<(Stated, Sizes)> {
     let (mut values, starts) = (fitted.values.clone(), &fitted.starts);
@@ -196,7 +198,8 @@ fn again(
         joint: &joint,
         scale: &scale,
     };
-    let found = around.stated(&weighed, (chosen, fitted.clone()), None, scorer)?;
+    fits.forget_places_apart_from(&chosen, columns);
+    let found = around.stated(&weighed, (chosen, fitted.clone()), None, scorer, fits)?;
     let sizes = Sizes::of(&around, library, &found.chosen, &found.fitted, windows)?;
     Some((found, sizes))
 }
@@ -421,7 +424,8 @@ mod tests {
             statements: Vec::new(),
         };
         let (found, sizes) =
-            again(&engine, &columns, &LIBRARY, &both.training, 1.0, &scorer, nothing).unwrap();
+            again(&engine, &columns, &LIBRARY, &both.training, 1.0, (&scorer, &Fits::default()), nothing)
+                .unwrap();
         let named: Vec<EffectId> = found.statements.iter().map(|s| columns.effects[s.term - FIRST]).collect();
         assert_eq!(named, [EffectId::SteeringLag]);
         let (size, _) = sizes.effect(&columns, EffectId::SteeringLag).unwrap();

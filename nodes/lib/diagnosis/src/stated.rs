@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use crate::around::{Around, Refined};
 use crate::budget::Scorer;
+use crate::columns::Columns;
 use crate::decisions;
 use crate::discrepancy::Discrepancy;
 use crate::infer::FIRST;
@@ -40,6 +41,31 @@ impl Tried {
     /// Which configuration it is, and its fit.
     fn place(&self) -> Option<(&[usize], &Refined)> {
         Some((&self.chosen, &self.fitted))
+    }
+}
+
+/// Configurations that were fitted to the end. A fit asks for nothing that a linearisation says but where to begin, and is as good around another one.
+#[derive(Debug, Default)]
+pub(crate) struct Fits(Mutex<HashMap<Vec<usize>, Option<Tried>>>);
+
+impl Fits {
+    fn known(&self, chosen: &[usize]) -> Option<Option<Tried>> {
+        self.0.lock().ok()?.get(chosen).cloned()
+    }
+
+    fn learn(&self, chosen: Vec<usize>, fit: Option<Tried>) {
+        if let Ok(mut fits) = self.0.lock() {
+            fits.insert(chosen, fit);
+        }
+    }
+
+    /// Forgets those with an effect of a place that a model lacks: linearised around this model, the effect is looked for at another place.
+    pub(crate) fn forget_places_apart_from(&self, model: &[usize], columns: &Columns) {
+        let elsewhere = |&t: &usize| columns.effects[t - FIRST].is_of_a_place() && model[t] == 0;
+        let elsewhere: Vec<usize> = (FIRST..FIRST + columns.effects.len()).filter(elsewhere).collect();
+        if let Ok(mut fits) = self.0.lock() {
+            fits.retain(|chosen, _| elsewhere.iter().all(|&t| chosen[t] == 0));
+        }
     }
 }
 
@@ -80,8 +106,9 @@ impl Around<'_, '_> {
         (start, fitted): (Vec<usize>, Refined),
         alone: Option<Vec<usize>>,
         scorer: &Scorer<'_>,
+        fits: &Fits,
     ) -> Option<Stated> {
-        let (fits, starts) = (Mutex::default(), OnceLock::new());
+        let starts = OnceLock::new();
         let asked = Asked { around: self, weighed, scorer, fits, starts, worst: f64::INFINITY };
         let nothing = asked.fitted(vec![0; start.len()], None)?;
         let asked = Asked { worst: nothing.cost, ..asked };
@@ -126,7 +153,7 @@ struct Asked<'q, 'p, 'a, 's> {
     /// Cost with no effect at all.
     worst: f64,
     /// What was fitted already.
-    fits: Mutex<HashMap<Vec<usize>, Option<Tried>>>,
+    fits: &'q Fits,
     /// Start states of the first of them on the data held out.
     starts: OnceLock<Vec<[f64; 2]>>,
 }
@@ -144,26 +171,29 @@ impl Asked<'_, '_, '_, '_> {
 
     /// A configuration fitted by rollouts; `near`: another one with its fit.
     fn fitted(&self, chosen: Vec<usize>, near: Option<(&[usize], &Refined)>) -> Option<Tried> {
-        let known = |fits: &HashMap<_, Option<Tried>>| fits.get(&chosen).cloned();
-        if let Some(found) = self.fits.lock().ok().and_then(|fits| known(&fits)) {
+        if let Some(found) = self.fits.known(&chosen) {
             return found;
         }
         let found = self.tried(chosen.clone(), |around, chosen| {
             around.by_rollouts_to_the_end(&self.weighed.total, chosen, near)
         });
-        if let Ok(mut fits) = self.fits.lock() {
-            fits.insert(chosen, found.clone());
-        }
+        self.fits.learn(chosen, found.clone());
         found
     }
 
-    /// A configuration fitted roughly, for a look: near the linearisation, or beside another one, whichever predicts better.
-    fn look(&self, chosen: Vec<usize>, beside: &Tried) -> Option<Tried> {
+    /// A configuration fitted roughly, for a look: beside another one, or, unless that predicts well enough, near the linearisation, whichever is better.
+    fn look(&self, chosen: Vec<usize>, beside: &Tried, well: f64) -> Option<Tried> {
+        if let Some(found) = self.fits.known(&chosen) {
+            return found;
+        }
         let total = &self.weighed.total;
-        let near = self.tried(chosen.clone(), |around, chosen| Some(around.nearby(total, chosen)?.1));
-        let beside =
-            self.tried(chosen, |around, chosen| Some(around.beside(total, chosen, beside.place()?)?.1));
-        near.into_iter().chain(beside).min_by(|a, b| a.cost.total_cmp(&b.cost))
+        let look = self
+            .tried(chosen.clone(), |around, chosen| Some(around.beside(total, chosen, beside.place()?)?.1));
+        if look.as_ref().is_some_and(|look| look.cost <= well) {
+            return look;
+        }
+        let near = self.tried(chosen, |around, chosen| Some(around.nearby(total, chosen)?.1));
+        near.into_iter().chain(look).min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
 
     fn tried(
@@ -181,7 +211,7 @@ impl Asked<'_, '_, '_, '_> {
     fn lacking(&self, from: &Tried, part: &[usize]) -> Option<Tried> {
         let mut chosen = from.chosen.clone();
         part.iter().for_each(|&i| chosen[i] = 0);
-        let near = self.look(chosen.clone(), from);
+        let near = self.look(chosen.clone(), from, f64::NEG_INFINITY);
         // Worse than with no effect at all: too far away for a look.
         near.filter(|n| n.cost <= self.worst).or_else(|| self.fitted(chosen, from.place()))
     }
@@ -301,11 +331,19 @@ impl Asked<'_, '_, '_, '_> {
                 fuller
             };
             let offered = self.offered(&now, with);
-            let looks: Vec<(usize, f64)> =
-                offered.into_par_iter().filter_map(|i| Some((i, self.look(with(i), &now)?.cost))).collect();
+            let looks: Vec<(usize, Tried)> = offered
+                .into_par_iter()
+                .filter_map(|i| Some((i, self.look(with(i), &now, now.cost)?)))
+                .collect();
+            let costs: Vec<(usize, f64)> = looks.iter().map(|(i, look)| (*i, look.cost)).collect();
             let likely = |cost: f64| self.log_odds(now.cost, cost) > 0.0;
-            let by_fit = |i: usize| self.fitted(with(i), now.place()).filter(|fuller| likely(fuller.cost));
-            match to_be_fitted(&looks, now.cost, likely).into_iter().find_map(by_fit) {
+            // A look that went astray is no place to begin.
+            let begin = |i: usize| {
+                let look = looks.iter().find(|(effect, look)| *effect == i && look.cost < now.cost);
+                look.map_or(&now, |(_, look)| look).place()
+            };
+            let by_fit = |i: usize| self.fitted(with(i), begin(i)).filter(|fuller| likely(fuller.cost));
+            match to_be_fitted(&costs, now.cost, likely).into_iter().find_map(by_fit) {
                 Some(fuller) => now = fuller,
                 None => return Some(now),
             }

@@ -177,12 +177,27 @@ fn of_two_drives_only_what_has_changed_is_told() {
         let request = Request { earlier: Some(&earlier), ..Request::new(recording, &vehicle) };
         diagnose(&request, &mut |_| {}).unwrap()
     };
+    let itself = since(&late);
+    assert!(itself.verdict == Verdict::NoGap && itself.changes.is_empty(), "{}", text(&itself));
     let same = since(&late_too);
     assert!(matches!(same.verdict, Verdict::NoGap | Verdict::TireRetuneOnly), "{}", text(&same));
     let gone = since(&prompt);
     assert_eq!(named(&gone), ["steering_delay"], "{}", text(&gone));
     let delay_s = gone.effects[0].parameters["delay_s"].clone();
     assert!(delay_s.low <= 0.0 && delay_s.high < 0.01 && delay_s.before.unwrap() > 0.035, "{delay_s:?}");
+}
+
+#[test]
+fn other_tires_since_the_drive_before_are_a_change_of_no_effect() {
+    let small = CarParameters::by_name("f1tenth").unwrap();
+    let vehicle = nominal(&small);
+    let [before, slippery] = [(&[][..], 41), (&["grip_scale=0.75"], 42)]
+        .map(|(effects, seed)| drive_at(&small, effects, 1.0, DURATION_S, seed).unwrap());
+    let earlier = Earlier::diagnosed(&Request::new(&before, &vehicle), &mut |_| {}).unwrap();
+    let request = Request { earlier: Some(&earlier), ..Request::new(&slippery, &vehicle) };
+    let d = diagnose(&request, &mut |_| {}).unwrap();
+    assert_eq!(d.verdict, Verdict::TireRetuneOnly, "{}", text(&d));
+    assert_eq!(d.changes[0].name, "tires", "{}", text(&d));
 }
 
 #[test]

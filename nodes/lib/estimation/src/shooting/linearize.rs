@@ -84,8 +84,11 @@ pub fn linearize<M: Rollout>(
                 13..=16 => part::<M, 16>(problem, &free, parameters, *start, window),
                 17..=20 => part::<M, 20>(problem, &free, parameters, *start, window),
                 21..=24 => part::<M, 24>(problem, &free, parameters, *start, window),
-                25..=32 => part::<M, 32>(problem, &free, parameters, *start, window),
-                33..=48 => part::<M, 48>(problem, &free, parameters, *start, window),
+                25..=28 => part::<M, 28>(problem, &free, parameters, *start, window),
+                29..=32 => part::<M, 32>(problem, &free, parameters, *start, window),
+                33..=36 => part::<M, 36>(problem, &free, parameters, *start, window),
+                37..=40 => part::<M, 40>(problem, &free, parameters, *start, window),
+                41..=48 => part::<M, 48>(problem, &free, parameters, *start, window),
                 49..=80 => part::<M, 80>(problem, &free, parameters, *start, window),
                 _ => in_passes::<M, 80>(problem, &free, parameters, *start, window),
             }
