@@ -176,23 +176,37 @@ pub(crate) fn pictures_of_bags(
         }
     }
     let bags = paths.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", ");
-    Ok(Seen { bags, several: paths.len() > 1, pictures })
+    Ok(Seen { bags, undated: paths.len() > 1, pictures })
 }
 
 /// What pictures said.
 pub(crate) struct Seen {
     /// Whose they are.
     bags: String,
-    /// Whether those are several, whose stamps say nothing of each other.
-    several: bool,
+    /// Whether the stamps say nothing of when in the drive they were taken: those of several bags, or of another clock.
+    undated: bool,
     /// Stamp and estimate of each.
     pictures: Vec<(i64, Estimate)>,
 }
 
 impl Seen {
-    /// The mean of what the pictures between two stamps say; of several bags, all.
+    /// Takes note of when the whole drive was, ns: where none of the pictures was taken then, they were stamped by another clock.
+    pub(crate) fn beside(mut self, from_ns: i64, to_ns: i64) -> Self {
+        let during = self.pictures.iter().any(|(stamp_ns, _)| (from_ns..=to_ns).contains(stamp_ns));
+        if !self.undated && !during && !self.pictures.is_empty() {
+            tracing::warn!(
+                "{}: all {} pictures are stamped outside of the drive, by another clock: each part of the drive has the mean of all of them",
+                self.bags,
+                self.pictures.len()
+            );
+            self.undated = true;
+        }
+        self
+    }
+
+    /// The mean of what the pictures between two stamps say; of pictures that are not dated, all.
     pub(crate) fn between(&self, from_ns: i64, to_ns: i64) -> anyhow::Result<FrictionPrior> {
-        let inside = |(stamp_ns, _): &&(i64, Estimate)| self.several || (from_ns..=to_ns).contains(stamp_ns);
+        let inside = |(stamp_ns, _): &&(i64, Estimate)| self.undated || (from_ns..=to_ns).contains(stamp_ns);
         let estimates = self.pictures.iter().filter(inside).map(|(_, estimate)| estimate);
         let (mut mu, mut second, mut valid, mut new_floor) = (0.0, 0.0, 0.0, 0_usize);
         let mut refused: BTreeMap<&'static str, usize> = BTreeMap::new();
@@ -226,5 +240,52 @@ impl Seen {
             prior.sigma
         );
         Ok(prior)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use gripsight_friction::Source;
+
+    use super::*;
+
+    fn seen(pictures: &[(i64, f64)]) -> Seen {
+        let estimate = |mu| Estimate {
+            stamp_ns: None,
+            source: Source::Camera,
+            reason: None,
+            detail: None,
+            mu,
+            sigma: 0.05,
+            probability: Vec::new(),
+            entropy: 0.0,
+            energy: 0.0,
+            unfamiliarity: None,
+            quality: None,
+            appearance: None,
+            network_mu: None,
+            known: None,
+            distance_m: 0.0,
+            pictures: 1,
+        };
+        let pictures = pictures.iter().map(|&(stamp_ns, mu)| (stamp_ns, estimate(mu))).collect();
+        Seen { bags: "a bag".to_owned(), undated: false, pictures }
+    }
+
+    #[test]
+    fn a_part_of_a_drive_has_the_pictures_of_its_time() {
+        let seen = seen(&[(10, 0.9), (20, 0.9), (30, 0.5)]).beside(0, 40);
+        let is = |from_ns, to_ns, mu: f64| (seen.between(from_ns, to_ns).unwrap().mu - mu).abs() < 1e-9;
+        assert!(is(0, 25, 0.9) && is(25, 40, 0.5));
+        assert!(seen.between(31, 40).is_err(), "the camera had stopped");
+    }
+
+    #[test]
+    fn pictures_of_another_clock_are_of_the_whole_drive() {
+        let prior = seen(&[(10, 0.9), (20, 0.5)]).beside(1_000, 2_000).between(1_000, 1_500).unwrap();
+        assert!((prior.mu - 0.7).abs() < 1e-9, "{}", prior.mu);
+        assert!(prior.sigma > 0.2, "two surfaces are one wide prior: {}", prior.sigma);
     }
 }

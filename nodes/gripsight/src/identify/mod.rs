@@ -168,13 +168,17 @@ impl IdentifyArgs {
         VehicleParameters::from_ros_yaml(&text).with_context(|| format!("cannot use {}", path.display()))
     }
 
-    fn belief(&self, topics: &TopicMap) -> Belief {
+    fn belief(&self, topics: &TopicMap, sequences: &[StateSequence]) -> Belief {
         if !self.camera {
             return Belief::Stated(self.prior_mu.map(|mu| FrictionPrior { mu, sigma: self.prior_sigma }));
         }
         // The data alone are judged first: a prior is one set more, and its lack is no reason to lose the other.
         match pictures_of_bags(&self.bags, topics, &self.pictures) {
-            Ok(seen) => Belief::Seen(seen),
+            Ok(seen) => {
+                let ends_ns = sequences.iter().map(end_ns).max().unwrap_or_default();
+                let starts_ns = sequences.iter().map(|s| s.start_stamp_ns).min().unwrap_or_default();
+                Belief::Seen(seen.beside(starts_ns, ends_ns))
+            }
             Err(error) => {
                 tracing::warn!("no friction prior: {error:#}; identified without one");
                 Belief::Stated(None)
@@ -206,6 +210,11 @@ impl IdentifyArgs {
     }
 }
 
+/// When a drive ends, ns.
+fn end_ns(sequence: &StateSequence) -> i64 {
+    sequence.start_stamp_ns + (sequence.duration_s() * NS_PER_S) as i64
+}
+
 /// What is believed of the friction before the tires tell.
 enum Belief {
     /// The same all along.
@@ -221,8 +230,7 @@ impl Belief {
             Self::Stated(prior) => return *prior,
             Self::Seen(seen) => seen,
         };
-        let to_ns = sequence.start_stamp_ns + (sequence.duration_s() * NS_PER_S) as i64;
-        match seen.between(sequence.start_stamp_ns, to_ns) {
+        match seen.between(sequence.start_stamp_ns, end_ns(sequence)) {
             Ok(prior) => Some(prior),
             Err(error) => {
                 tracing::warn!("no friction prior: {error:#}; identified without one");
@@ -253,7 +261,7 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
     }
     let notes = data_notes(&report, model.as_ref());
     timing.reading_s = start.elapsed().as_secs_f64();
-    let belief = args.belief(&topics);
+    let belief = args.belief(&topics, &sequences);
     timing.camera_s = start.elapsed().as_secs_f64() - timing.reading_s;
     fs::create_dir_all(&args.out).with_context(|| format!("cannot make {}", args.out.display()))?;
     let config = args.config();

@@ -188,7 +188,7 @@ fn of_two_drives_only_what_has_changed_is_told() {
 }
 
 #[test]
-fn other_tires_since_the_drive_before_are_a_change_of_no_effect() {
+fn other_tires_since_the_drive_before_are_told_first() {
     let small = CarParameters::by_name("f1tenth").unwrap();
     let vehicle = nominal(&small);
     let [before, slippery] = [(&[][..], 41), (&["grip_scale=0.75"], 42)]
@@ -196,8 +196,7 @@ fn other_tires_since_the_drive_before_are_a_change_of_no_effect() {
     let earlier = Earlier::diagnosed(&Request::new(&before, &vehicle), &mut |_| {}).unwrap();
     let request = Request { earlier: Some(&earlier), ..Request::new(&slippery, &vehicle) };
     let d = diagnose(&request, &mut |_| {}).unwrap();
-    assert_eq!(d.verdict, Verdict::TireRetuneOnly, "{}", text(&d));
-    assert_eq!(d.changes[0].name, "tires", "{}", text(&d));
+    assert!(d.changes[0].name == "tires" && d.changes[0].probability > 0.9, "{}", text(&d));
 }
 
 #[test]
