@@ -1,6 +1,6 @@
 //! What has changed between two drives of one car: every parameter is there in both drives, and its *difference* is what is asked for.
 //!
-//! Both drives are linearised, each around its own best model. The parameters of the earlier drive theta and the differences delta are unknown
+//! Both drives are linearised in the same way. The parameters of the earlier drive theta and the differences delta are unknown
 //! together; whatever either drive leaves unexplained is in the parameters and flexible terms of both, and only what one has and the other
 //! has not is a change:
 //!
