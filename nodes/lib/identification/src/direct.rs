@@ -42,6 +42,8 @@ use prior::{believed, contradicts, with_believed, with_prior};
 use signals::signal_parameters;
 use weights::{Weights, weights};
 
+/// How long a car takes at most to move by a force: slips so near to the end of what a fit follows have not shown theirs.
+const ANSWERED_S: f64 = 0.2;
 /// Steering delays that step 1 starts from, s.
 const DELAY_STARTS_S: [f64; 4] = [0.01, 0.06, 0.14, 0.3];
 /// Robustness of the window loss, in noises.
@@ -132,7 +134,7 @@ pub(crate) fn direct(
     restart(&mut all, &start.parameters);
     let (all, found, weights, shift) = fitter.refine(&all, weights);
 
-    let (slips, points) = fitter.visited(&found);
+    let (slips, points) = fitter.visited(&found, &weights);
     let mut peak =
         PerAxle { front: evidence(&found, 0, &slips.front), rear: evidence(&found, 4, &slips.rear) };
     let with_prior = match prior {
@@ -359,7 +361,7 @@ impl Fitter<'_> {
             return Ok(None);
         }
         let with_it = better(with_believed(all, found, peak, prior));
-        let (_, points) = self.visited(&with_it);
+        let (_, points) = self.visited(&with_it, weights);
         let tires = tires_of(&with_it.parameters);
         let axle = |points, tire: &MagicFormula, peak: &PeakEvidence| {
             // What was shown is a lower bound.
@@ -390,12 +392,29 @@ impl Fitter<'_> {
         fast > std::f64::consts::SQRT_2 * slow
     }
 
-    /// Slip angles, and F_y/F_z at them, along the fitted trajectories.
-    fn visited(&self, fit: &Fit) -> (PerAxle<Slips>, PerAxle<Vec<Point>>) {
+    /// Slip angles, and F_y/F_z at them, along the fitted trajectories, where windows show them and what follows answers to them.
+    fn visited(&self, fit: &Fit, weights: &Weights) -> (PerAxle<Slips>, PerAxle<Vec<Point>>) {
         let mut points = PerAxle { front: Vec::new(), rear: Vec::new() };
         let car = SingleTrack::new(self.model.vehicle, &tires_of(&fit.parameters));
-        for (window, start) in self.training.iter().zip(&fit.starts) {
+        let shown: Vec<bool> = self
+            .training
+            .iter()
+            .zip(&fit.starts)
+            .map(|(window, start)| weights.shows(&self.model, &fit.parameters, *start, window))
+            .collect();
+        let follows = |later: &Window, w: &Window| later.segment == w.segment && later.from == w.from + w.len;
+        for (i, (window, start)) in
+            self.training.iter().zip(&fit.starts).enumerate().filter(|(i, _)| shown[*i])
+        {
+            let followed =
+                self.training.get(i + 1).is_some_and(|later| shown[i + 1] && follows(later, window));
+            let unanswered = if followed { 0 } else { (ANSWERED_S / self.data.dt_s).round() as usize };
+            let mut left = window.len.saturating_sub(unanswered);
             self.model.trajectory(&fit.parameters, *start, window, |at| {
+                if left == 0 {
+                    return;
+                }
+                left -= 1;
                 let (front, rear) = car.slip_angles_rad(&at.state, &at.input);
                 let forces = at.normalized_forces(&fit.parameters);
                 points.front.push(Point { slip_rad: front, force: forces.0 });

@@ -1,8 +1,9 @@
 //! Bad samples cost themselves, not the bag: what of a sequence is not to be used, and why.
 //!
 //! * A single sample of v_x, v_y or yaw rate that stands out ([`Spikes`]' rule) is left out; of an optional channel it is bridged by its neighbours.
-//! * Samples of v_x, v_y or yaw rate that a jump no car makes leads to, and another leads back from within two seconds, are left out: seconds in other
+//! * Samples of v_x, v_y, yaw rate or steering that a jump no car makes leads to, and another leads back from within two seconds, are left out: seconds in other
 //!   units, a second source. At the ends of a sequence one such jump does.
+//! * Steering beyond what wheels turn to is left out, with what jumps lead to it and back.
 //! * A channel that repeats one value for over half a second while the car moves and then *jumps* was frozen: those samples are left out. One
 //!   that goes on from where it stood was constant (a simulator's cruise) or within its sensor's dead band, and stays.
 //! * A pose that jumps and stays is told; nothing is left out, since what uses poses uses their differences over short spans.
@@ -59,6 +60,10 @@ const JUMP_STEPS: f64 = 8.0;
 /// No car's speeds (m/s2) and yaw rate (rad/s2) change faster.
 const MOST_MPS2: f64 = 100.0;
 const MOST_RADPS2: f64 = 500.0;
+/// No road wheel turns faster (rad/s): the fastest servos take 0.05 s for 60 degrees, and linkages about halve it.
+const MOST_RADPS: f64 = 12.0;
+/// None turns further (rad).
+const MOST_LOCK_RAD: f64 = std::f64::consts::FRAC_PI_3;
 /// Longest burst (s).
 const MOST_BURST_S: f64 = 2.0;
 /// Where more than this share of the samples stand out, they are not single bad ones: none is left out.
@@ -78,6 +83,14 @@ pub fn masked(sequence: &StateSequence) -> Result<Masked, SignalError> {
         ("v_y_mps", &sequence.v_y_mps, MOST_MPS2),
         ("yaw_rate_radps", &sequence.yaw_rate_radps, MOST_RADPS2),
     ];
+    let steering: Vec<f64> = sequence.steering_rad.iter().map(|&v| f64::from(v)).collect();
+    let mut steered = bursts_at(&time_s, &steering, MOST_RADPS);
+    steered.extend(beyond_lock(&time_s, &steering));
+    for (from, to, size) in steered {
+        keep[from..=to].fill(false);
+        let (from_s, to_s) = (time_s[from], time_s[to]);
+        out.bad.push(BadSpan { channel: "steering_rad", kind: BadKind::Burst, from_s, to_s, size });
+    }
     for (name, values, most_rate) in moving {
         let values: Vec<f64> = values.iter().map(|&v| f64::from(v)).collect();
         for (from, to, size) in bursts_at(&time_s, &values, most_rate) {
@@ -168,6 +181,30 @@ fn jumps(sequence: &StateSequence, bad: &mut Vec<BadSpan>) {
             bad.push(BadSpan { channel: "x_m", kind: BadKind::Jump, from_s, to_s, size: step });
         }
     }
+}
+
+/// First and last places of steering that wheels do not have, as far as jumps lead to it and back, and by how much it jumps. Where it crosses zero it is no
+/// better: what lies between two such spans within [`MOST_BURST_S`] is of one.
+fn beyond_lock(time_s: &[f64], steering_rad: &[f64]) -> Vec<(usize, usize, f64)> {
+    let near = |from: usize, to: usize| time_s[to] - time_s[from] <= MOST_BURST_S;
+    let jumped =
+        |k: usize| (steering_rad[k] - steering_rad[k - 1]).abs() > MOST_RADPS * (time_s[k] - time_s[k - 1]);
+    let mut found: Vec<(usize, usize, f64)> = Vec::new();
+    for k in (0..steering_rad.len()).filter(|&k| steering_rad[k].abs() > MOST_LOCK_RAD) {
+        match found.last_mut().filter(|(_, to, _)| near(*to, k)) {
+            Some((_, to, size)) => (*to, *size) = (k, size.max(steering_rad[k].abs())),
+            None => found.push((k, k, steering_rad[k].abs())),
+        }
+    }
+    for (from, to, _) in &mut found {
+        let (first, last) = (*from, *to);
+        *from = (1..=first).filter(|&k| near(k, first) && jumped(k)).min().unwrap_or(first);
+        *to = (last + 1..steering_rad.len())
+            .filter(|&k| near(last, k) && jumped(k))
+            .max()
+            .map_or(last, |k| k - 1);
+    }
+    found
 }
 
 /// First and last places of bursts, and how high the jump is.
@@ -301,6 +338,29 @@ mod tests {
         let mut stays = drive();
         stays.v_x_mps[500..].iter_mut().for_each(|v| *v += 5.0);
         assert_eq!(masked(&stays).unwrap(), Masked { sequence: stays, bad: Vec::new() });
+    }
+
+    #[test]
+    fn seconds_of_steering_in_degrees_are_left_out_and_a_flick_to_full_lock_is_not() {
+        let mut drive = drive();
+        drive.steering_rad.iter_mut().for_each(|d| *d *= 0.4);
+        // Through zero at 6.28 s, at the beginning, at the end, and for longer than a burst.
+        for (from, to) in [(600, 640), (0, 60), (950, 1000), (300, 800)] {
+            let mut harmed = drive.clone();
+            harmed.steering_rad[from..to].iter_mut().for_each(|d| *d *= 57.3);
+            let out = masked(&harmed).unwrap();
+            let steered = out.sequence.steering_rad.iter().fold(0.0_f32, |most, d| most.max(d.abs()));
+            let kept = if to - from > 200 { 1000 } else { 1000 - (to - from) };
+            // All of it: that is no burst, and said of the whole drive.
+            assert!(steered < 0.45 || kept == 1000, "{from} {to}: {steered}");
+            assert!(out.sequence.len().abs_diff(kept) <= 2, "{from} {to}: {}", out.sequence.len());
+        }
+        let mut flick = drive.clone();
+        for (k, d) in flick.steering_rad[450..550].iter_mut().enumerate() {
+            // To the other lock and back, a tenth of a radian a sample.
+            *d += 0.1 * (k.min(99 - k) as f32).min(8.0);
+        }
+        assert!(masked(&flick).unwrap().bad.is_empty());
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! How much a residual counts.
 
+use super::ROBUST_K;
 use crate::data::median;
 use crate::rollout::TireRollout;
 use gripsight_estimation::shooting::Fit;
@@ -37,6 +38,9 @@ pub(super) fn weights(model: &TireRollout<'_>, fit: &Fit, windows: &[Window], no
 /// How much the scores of windows vary over what the correlation within them explains: 2 to 4 on development drives.
 const MISFIT: f64 = 4.0;
 
+/// Share of how a window moved that a fit explains at least where it shows forces: more than it leaves.
+const LEAST_EXPLAINED: f64 = 0.5;
+
 /// Scatter of a fit.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Weights {
@@ -44,4 +48,30 @@ pub(super) struct Weights {
     pub(super) scatter: [f64; 2],
     /// The same for samples that count as independent.
     pub(super) sigma: [f64; 2],
+}
+
+impl Weights {
+    /// Whether a window shows the forces at the slips that a fit drives it at. It does not where the fit misses it by more than others and leaves more of how it
+    /// moved than it explains: there something else than the tires made what was recorded, such as commands that never came to the wheels.
+    pub(super) fn shows(
+        &self,
+        model: &TireRollout<'_>,
+        parameters: &[f64],
+        start: [f64; 2],
+        window: &Window,
+    ) -> bool {
+        let (mut predicted, mut measured) = (Vec::new(), Vec::new());
+        model.rollout(parameters, start, window, &mut predicted);
+        model.measured(window, &mut measured);
+        let (mut missed, mut moved) = (0.0, 0.0);
+        for (channel, scatter) in self.scatter.iter().enumerate() {
+            let pairs =
+                predicted.iter().zip(&measured).skip(channel).step_by(2).filter(|(_, m)| m.is_finite());
+            let n = pairs.clone().count().max(1) as f64;
+            let mean = pairs.clone().map(|(_, m)| m).sum::<f64>() / n;
+            missed += pairs.clone().map(|(p, m)| ((p - m) / scatter).powi(2)).sum::<f64>() / n;
+            moved += pairs.map(|(_, m)| ((m - mean) / scatter).powi(2)).sum::<f64>() / n;
+        }
+        missed <= (ROBUST_K.powi(2) * self.scatter.len() as f64).max(LEAST_EXPLAINED * moved)
+    }
 }

@@ -289,6 +289,27 @@ fn a_signal_that_is_turned_or_in_another_unit_is_refused_with_the_line_that_mend
     assert!(outcome.accepted, "{:?}", outcome.reasons);
 }
 
+#[test]
+fn commands_in_another_unit_for_a_moment_show_no_slips() {
+    let (_, honest, vehicle) = drive(scenario("formula_student", "harbor", 1.1, 0.85, 23).duration(20.0));
+    let driven = |s: &StateSequence| {
+        let outcome = identify(s, &vehicle, None, None, &quick(), &mut |_| {}).unwrap();
+        outcome.valid_within.slip_rad.front
+    };
+    let honestly = driven(&honest);
+    // The first 8 s and all of it; the burst at the end of a window, in the middle of the drive, and for whole windows.
+    for (until_s, from, len) in [(8.0, 775, 21), (20.0, 775, 21), (20.0, 1210, 130), (20.0, 300, 450)] {
+        let mut s = honest.between(0.0, until_s).unwrap();
+        s.steering_rad[from..from + len].iter_mut().for_each(|x| *x *= 57.3);
+        let lying = driven(&s);
+        // A rejected set is valid nowhere.
+        assert!(
+            lying.is_nan() || lying < 1.2 * honestly,
+            "{until_s} s, {from} {len}: {lying} rad, driven {honestly}"
+        );
+    }
+}
+
 /// Poses of a localisation of its own at 40 Hz, 2 cm and half a degree, 50 ms late, in place of the odometry's.
 fn localised(sequence: &StateSequence) -> StateSequence {
     use rand::SeedableRng;
