@@ -219,9 +219,7 @@ fn bursts_at(time_s: &[f64], values: &[f64], most_rate: f64) -> Vec<(usize, usiz
     while let Some(&k) = jumps.get(at) {
         // Back to where it came from, as far as a jump goes: that of a burst which changes within itself may be another's.
         let back = jumps[at + 1..].iter().position(|&j| {
-            is_short(k, j - 1)
-                && step(j) * step(k) < 0.0
-                && (values[j] - values[k - 1]).abs() < 0.25 * step(k).abs().max(step(j).abs())
+            is_short(k, j - 1) && (values[j] - values[k - 1]).abs() < 0.25 * step(k).abs().max(step(j).abs())
         });
         match back {
             Some(back) => {
@@ -344,8 +342,8 @@ mod tests {
     fn seconds_of_steering_in_degrees_are_left_out_and_a_flick_to_full_lock_is_not() {
         let mut drive = drive();
         drive.steering_rad.iter_mut().for_each(|d| *d *= 0.4);
-        // Through zero at 6.28 s, at the beginning, at the end, and for longer than a burst.
-        for (from, to) in [(600, 640), (0, 60), (950, 1000), (300, 800)] {
+        // Through zero at 6.28 s, and never beyond any lock there; at the beginning, at the end, and for longer than a burst.
+        for (from, to) in [(600, 640), (617, 629), (0, 60), (950, 1000), (300, 800)] {
             let mut harmed = drive.clone();
             harmed.steering_rad[from..to].iter_mut().for_each(|d| *d *= 57.3);
             let out = masked(&harmed).unwrap();
