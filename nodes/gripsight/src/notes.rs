@@ -21,6 +21,18 @@ pub(crate) fn read_notes(report: &ReadReport) -> Vec<String> {
     let recorded =
         report.recorded_sequences.iter().map(|topic| format!("state sequences recorded on {topic}"));
     let first = taken.first_problem.iter().map(|problem| format!("first of those left out: {problem}"));
+    let unreadable = report.unreadable.iter().map(|u| {
+        let count = match u.messages {
+            1 => "a message that cannot be read is".to_owned(),
+            n => format!("{n} messages that cannot be read are"),
+        };
+        format!("{}: {count} left out (first: {})", u.topic, u.first)
+    });
     let cut = report.truncated.clone().into_iter();
-    cut.chain(recorded).chain(topic_notes(&report.topics)).chain(counted).chain(first).collect()
+    cut.chain(unreadable)
+        .chain(recorded)
+        .chain(topic_notes(&report.topics))
+        .chain(counted)
+        .chain(first)
+        .collect()
 }

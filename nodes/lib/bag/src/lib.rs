@@ -44,6 +44,6 @@ pub use recover::{Recovered, recover, refuse_overwriting};
 pub use sequence::{
     CHUNK_LIMIT_BYTES, Reassembler, RecordedSequence, read_recorded_sequences, sequence_to_messages,
 };
-pub use telemetry::{ReadReport, read_measurements, read_sequences};
+pub use telemetry::{ReadReport, Unreadable, read_measurements, read_sequences};
 pub use topics::{LiveStreams, MappedTopic, Mapping, Role, Streams, TopicMap};
 pub use writer::BagWriter;

@@ -1,5 +1,6 @@
 //! From a bag to measurements and sequences.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use gripsight_signals::{Measurement, Sequencer, StateSequence, Taken, TopicHealth, WindowConfig};
@@ -20,6 +21,8 @@ pub struct ReadReport {
     pub topics: Vec<TopicHealth>,
     /// Messages that said nothing about their stream: joints that are not the four wheels, sensors that report "not measured".
     pub without_content: usize,
+    /// Messages that could not be read and were left out, by topic.
+    pub unreadable: Vec<Unreadable>,
     /// What became of the rest, and what was left out.
     #[serde(flatten)]
     pub taken: Taken,
@@ -29,11 +32,58 @@ pub struct ReadReport {
     pub recorded_sequences: Option<String>,
 }
 
+/// Messages of a topic whose bytes are none of its type.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Unreadable {
+    /// The topic.
+    pub topic: String,
+    /// How many there are: fewer than were read.
+    pub messages: usize,
+    /// The first of them, and what is wrong with it.
+    pub first: String,
+}
+
+/// What was read of a topic and what could not be.
+#[derive(Default)]
+struct Reading {
+    read: usize,
+    unreadable: usize,
+    first: Option<BagError>,
+}
+
+impl Reading {
+    /// Counts a message; `None` where it is left out.
+    fn take<T>(&mut self, message: Result<T, BagError>) -> Option<T> {
+        match message {
+            Ok(message) => {
+                self.read += 1;
+                Some(message)
+            }
+            Err(error) => {
+                self.unreadable += 1;
+                self.first.get_or_insert(error);
+                None
+            }
+        }
+    }
+
+    /// What was left out; the first error where that is no exception.
+    fn done(self, topic: String) -> Result<Option<Unreadable>, BagError> {
+        match self.first {
+            Some(error) if self.unreadable >= self.read => Err(error),
+            Some(error) => {
+                Ok(Some(Unreadable { topic, messages: self.unreadable, first: error.to_string() }))
+            }
+            None => Ok(None),
+        }
+    }
+}
+
 /// Every measurement of a bag in the order of recording. NaN and stamps that go back are left out
-/// by the [`Aligner`](gripsight_signals::Aligner), not here.
+/// by the [`Aligner`](gripsight_signals::Aligner), not here. A message that cannot be read costs itself.
 ///
 /// # Errors
-/// [`BagError`]; a truncated bag is none: its whole messages are given, and the report says so.
+/// [`BagError`], also where half of a topic's messages cannot be read; a truncated bag is none: its whole messages are given, and the report says so.
 pub fn read_measurements(path: &Path, topics: &TopicMap) -> Result<(Vec<Measurement>, ReadReport), BagError> {
     measurements_of(&Bag::open(path)?, topics)
 }
@@ -43,6 +93,7 @@ fn measurements_of(bag: &Bag, topics: &TopicMap) -> Result<(Vec<Measurement>, Re
     let mut report = ReadReport { streams, ..ReadReport::default() };
     let mut measurements = Vec::new();
     let mut log_times_ns = Vec::new();
+    let mut readings: BTreeMap<String, Reading> = BTreeMap::new();
     for message in bag.messages() {
         let message = match message {
             Ok(message) => message,
@@ -53,24 +104,32 @@ fn measurements_of(bag: &Bag, topics: &TopicMap) -> Result<(Vec<Measurement>, Re
             Err(error) => return Err(error),
         };
         let topic = &message.channel.topic;
+        let reading = readings.entry(topic.clone()).or_default();
         for mapped in report.streams.mapped().iter().filter(|mapped| mapped.topic == *topic) {
             let measurement = mapped
                 .measurement(&message.data, message.log_time)
-                .map_err(|error| error.in_message(topic, measurements.len(), message.log_time))?;
-            measurements.push(measurement);
-            log_times_ns.push(message.log_time);
-        }
-        let Some(role) = report.streams.role(topic) else { continue };
-        let count = &mut report.counts[role as usize];
-        match decode::measurement(role, &message.data) {
-            Ok(Some(measurement)) => {
+                .map_err(|error| error.in_message(topic, measurements.len(), message.log_time));
+            if let Some(measurement) = reading.take(measurement) {
                 measurements.push(measurement);
                 log_times_ns.push(message.log_time);
             }
-            Ok(None) => report.without_content += 1,
-            Err(error) => return Err(error.in_message(topic, *count, message.log_time)),
+        }
+        let Some(role) = report.streams.role(topic) else { continue };
+        let count = &mut report.counts[role as usize];
+        let measurement = decode::measurement(role, &message.data)
+            .map_err(|error| error.in_message(topic, *count, message.log_time));
+        match reading.take(measurement) {
+            Some(Some(measurement)) => {
+                measurements.push(measurement);
+                log_times_ns.push(message.log_time);
+            }
+            Some(None) => report.without_content += 1,
+            None => {}
         }
         *count += 1;
+    }
+    for (topic, reading) in readings {
+        report.unreadable.extend(reading.done(topic)?);
     }
     if measurements.is_empty() {
         return Err(BagError::Empty { path: bag.path().to_owned() });

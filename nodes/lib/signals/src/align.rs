@@ -5,8 +5,8 @@
 //! once every stream seen has reached its stamp, or any stream is `patience_s` ahead of it.
 //!
 //! A bad message costs itself: not finite, a stamp before the one before it or far after it. Only where two messages of a stream in a
-//! row lie back by more than a second, in order, the clock itself was set back, and everything starts over; and a stamp more than five
-//! seconds ahead counts once a second message confirms it.
+//! row lie back by more than a second, in order, the clock itself was set back, and everything starts over; and a stamp far ahead counts once a second message
+//! confirms it: what is believed of one wrong stamp costs all messages up to it.
 
 use std::collections::VecDeque;
 
@@ -36,8 +36,9 @@ impl Default for AlignConfig {
 
 /// Two messages in a row that lie back further than this mean that the clock was set back.
 const CLOCK_JUMP_S: f64 = 1.0;
-/// A stamp further ahead than this is believed once another message confirms it.
-const AHEAD_S: f64 = 5.0;
+/// A stamp further ahead than this, and than so many steps of its stream, is believed once another message confirms it.
+const AHEAD_S: f64 = 0.5;
+const AHEAD_STEPS: f64 = 3.0;
 
 /// What became of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,6 +61,8 @@ struct Row {
 struct Stream {
     rows: VecDeque<Row>,
     newest_ns: Option<i64>,
+    /// From the message before the newest to it.
+    step_s: f64,
     count: usize,
     /// A message whose stamp lies far ahead, or far back: to be confirmed by the next.
     ahead: Option<Row>,
@@ -145,7 +148,7 @@ impl Aligner {
         }
         stream.behind = None;
         let ahead = stream.ahead.take();
-        if since_s > AHEAD_S {
+        if since_s > AHEAD_S.max(AHEAD_STEPS * stream.step_s) {
             match ahead {
                 Some(first) if first.stamp_ns < row.stamp_ns => self.take(place, first),
                 unconfirmed => {
@@ -204,6 +207,8 @@ impl Aligner {
     fn take(&mut self, place: usize, row: Row) {
         let stream = &mut self.streams[place];
         stream.count += 1;
+        let since_ns = |newest_ns| row.stamp_ns.saturating_sub(newest_ns);
+        stream.step_s = stream.newest_ns.map_or(0.0, |newest_ns| since_ns(newest_ns) as f64 / NS_PER_S);
         stream.newest_ns = Some(row.stamp_ns);
         stream.rows.push_back(row);
         let Some(kept) = &mut self.kept else { return };
@@ -464,8 +469,21 @@ mod tests {
 
     #[test]
     fn a_stale_command_is_not_held() {
-        let out = all(&[drive(0, 0.1), odometry(100), odometry(700), drive(800, 0.2), odometry(810)]);
-        assert_eq!(out.iter().map(|s| s.odometry.stamp_ns / 1_000_000).collect::<Vec<_>>(), [100, 810]);
+        let commands = [drive(0, 0.1), drive(800, 0.2), drive(805, 0.2)];
+        let [first, second, third] = commands;
+        let out = all(&[first, odometry(100), odometry(400), odometry(700), second, third, odometry(810)]);
+        assert_eq!(out.iter().map(|s| s.odometry.stamp_ns / 1_000_000).collect::<Vec<_>>(), [100, 400, 810]);
+    }
+
+    #[test]
+    fn one_stamp_seconds_ahead_does_not_cost_the_messages_up_to_it_and_a_slow_stream_costs_nothing() {
+        let mut messages: Vec<_> = (0..100).flat_map(|k| [drive(10 * k, 0.1), odometry(10 * k)]).collect();
+        messages.insert(40, drive(3_000, 0.3));
+        let out = all(&messages);
+        assert_eq!(out.len(), 100);
+        assert!(out.iter().all(|s| s.drive.steering_angle_rad == 0.1));
+        let slow: Vec<_> = (0..6).flat_map(|k| [drive(1000 * k - 100, 0.1), odometry(1000 * k)]).collect();
+        assert_eq!(all(&slow).len(), 6);
     }
 
     #[test]

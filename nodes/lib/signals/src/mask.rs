@@ -1,6 +1,7 @@
 //! Bad samples cost themselves, not the bag: what of a sequence is not to be used, and why.
 //!
-//! * A single sample of v_x, v_y or yaw rate that stands out ([`Spikes`]' rule) is left out; of an optional channel it is bridged by its neighbours.
+//! * A single sample of v_x, v_y or yaw rate that stands out ([`Spikes`]' rule) is left out; of an optional channel it is bridged by its neighbours. A command
+//!   may hold for one sample, and stands out only where no wheel follows it.
 //! * Samples of v_x, v_y, yaw rate or steering that a jump no car makes leads to, and another leads back from within two seconds, are left out: seconds in other
 //!   units, a second source. At the ends of a sequence one such jump does.
 //! * Steering beyond what wheels turn to is left out, with what jumps lead to it and back.
@@ -84,7 +85,7 @@ pub fn masked(sequence: &StateSequence) -> Result<Masked, SignalError> {
         ("yaw_rate_radps", &sequence.yaw_rate_radps, MOST_RADPS2),
     ];
     let steering: Vec<f64> = sequence.steering_rad.iter().map(|&v| f64::from(v)).collect();
-    let mut steered = bursts_at(&time_s, &steering, MOST_RADPS);
+    let mut steered = bursts_at(&time_s, &steering, MOST_RADPS, 1);
     steered.extend(beyond_lock(&time_s, &steering));
     for (from, to, size) in steered {
         keep[from..=to].fill(false);
@@ -93,7 +94,7 @@ pub fn masked(sequence: &StateSequence) -> Result<Masked, SignalError> {
     }
     for (name, values, most_rate) in moving {
         let values: Vec<f64> = values.iter().map(|&v| f64::from(v)).collect();
-        for (from, to, size) in bursts_at(&time_s, &values, most_rate) {
+        for (from, to, size) in bursts_at(&time_s, &values, most_rate, 2) {
             keep[from..=to].fill(false);
             let (from_s, to_s) = (time_s[from], time_s[to]);
             out.bad.push(BadSpan { channel: name, kind: BadKind::Burst, from_s, to_s, size });
@@ -207,8 +208,8 @@ fn beyond_lock(time_s: &[f64], steering_rad: &[f64]) -> Vec<(usize, usize, f64)>
     found
 }
 
-/// First and last places of bursts, and how high the jump is.
-fn bursts_at(time_s: &[f64], values: &[f64], most_rate: f64) -> Vec<(usize, usize, f64)> {
+/// First and last places of bursts of at least so many samples, and how high the jump is.
+fn bursts_at(time_s: &[f64], values: &[f64], most_rate: f64, samples: usize) -> Vec<(usize, usize, f64)> {
     let least = JUMP_STEPS * usual_step(values);
     let step = |k: usize| values[k] - values[k - 1];
     let is_jump = |&k: &usize| step(k).abs() > least.max(most_rate * (time_s[k] - time_s[k - 1]));
@@ -224,7 +225,7 @@ fn bursts_at(time_s: &[f64], values: &[f64], most_rate: f64) -> Vec<(usize, usiz
         match back {
             Some(back) => {
                 let end = jumps[at + 1 + back];
-                if end > k + 1 {
+                if end >= k + samples {
                     found.push((k, end - 1, step(k).abs()));
                 }
                 at += back + 1;

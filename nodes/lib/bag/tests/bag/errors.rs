@@ -1,6 +1,6 @@
 //! Every way in which a bag can be wrong gives its own error, with the place in its text.
 
-use gripsight_bag::{Bag, BagError, BagWriter, TopicMap, encode, read_sequences};
+use gripsight_bag::{Bag, BagError, BagWriter, TopicMap, encode, read_measurements, read_sequences};
 use gripsight_msgs::standard::rosgraph_msgs::Clock;
 use tempfile::TempDir;
 
@@ -115,6 +115,18 @@ fn bytes_that_are_no_message() {
     let mut huge_text = Channel::odom().data;
     huge_text[12..16].copy_from_slice(&u32::MAX.to_le_bytes());
     assert!(matches!(of(huge_text), BagError::Body { .. }));
+}
+
+#[test]
+fn a_message_that_cannot_be_read_costs_itself() {
+    let folder = TempDir::new().unwrap();
+    let bad = Channel { data: vec![0, 1], ..Channel::odom() };
+    let bytes = ros2(&[Channel::odom(), bad, Channel::odom(), Channel::drive()]);
+    let (measurements, report) = read_measurements(&file(&folder, &bytes), &TopicMap::default()).unwrap();
+    assert_eq!(measurements.len(), 3);
+    let [unreadable] = &report.unreadable[..] else { panic!("{:?}", report.unreadable) };
+    assert_eq!((&unreadable.topic[..], unreadable.messages), ("/odom", 1));
+    assert!(unreadable.first.contains("message 1 "), "{}", unreadable.first);
 }
 
 #[test]
