@@ -133,15 +133,13 @@ impl Pair {
         (chosen != self.around).then_some((values, chosen))
     }
 
-    /// Whether the later drive is likelier to be of this model than of one with fewer terms, by what either leaves of it and what the drives contradict each
-    /// other by.
+    /// Whether the later drive is likelier to be of this model than of one with fewer terms, by what either leaves of it; and the drives contradict each other by
+    /// no more.
     fn is_likelier(&self, simpler: &Self) -> bool {
         let contradiction = |of: &Self| of.compared.dispersion;
         let gained = (simpler.later.weighed.cost - self.later.weighed.cost) / self.later.dispersion;
-        let contradicts =
-            (contradiction(self) / contradiction(simpler)).ln() * self.later.values.len() as f64;
-        gained
-            > contradiction(simpler) * (price(&self.later.terms, &simpler.around, &self.around) + contradicts)
+        contradiction(self) <= contradiction(simpler)
+            && gained > contradiction(simpler) * price(&self.later.terms, &simpler.around, &self.around)
     }
 }
 
