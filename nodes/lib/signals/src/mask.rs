@@ -184,28 +184,28 @@ fn jumps(sequence: &StateSequence, bad: &mut Vec<BadSpan>) {
     }
 }
 
-/// First and last places of steering that wheels do not have, as far as jumps lead to it and back, and by how much it jumps. Where it crosses zero it is no
-/// better: what lies between two such spans within [`MOST_BURST_S`] is of one.
+/// First and last places of steering that wheels do not have, as far as jumps lead to it and back, and how far it goes. Where it crosses zero it is no better:
+/// what lies between two such spans within [`MOST_BURST_S`] is of one. What no jump leads to is the unit of the whole drive.
 fn beyond_lock(time_s: &[f64], steering_rad: &[f64]) -> Vec<(usize, usize, f64)> {
     let near = |from: usize, to: usize| time_s[to] - time_s[from] <= MOST_BURST_S;
-    let jumped =
-        |k: usize| (steering_rad[k] - steering_rad[k - 1]).abs() > MOST_RADPS * (time_s[k] - time_s[k - 1]);
-    let mut found: Vec<(usize, usize, f64)> = Vec::new();
+    let least = JUMP_STEPS * usual_step(steering_rad);
+    let jumped = |k: usize| {
+        let most = MOST_RADPS * (time_s[k] - time_s[k - 1]);
+        (steering_rad[k] - steering_rad[k - 1]).abs() > least.max(most)
+    };
+    let mut spans: Vec<(usize, usize, f64)> = Vec::new();
     for k in (0..steering_rad.len()).filter(|&k| steering_rad[k].abs() > MOST_LOCK_RAD) {
-        match found.last_mut().filter(|(_, to, _)| near(*to, k)) {
+        match spans.last_mut().filter(|(_, to, _)| near(*to, k)) {
             Some((_, to, size)) => (*to, *size) = (k, size.max(steering_rad[k].abs())),
-            None => found.push((k, k, steering_rad[k].abs())),
+            None => spans.push((k, k, steering_rad[k].abs())),
         }
     }
-    for (from, to, _) in &mut found {
-        let (first, last) = (*from, *to);
-        *from = (1..=first).filter(|&k| near(k, first) && jumped(k)).min().unwrap_or(first);
-        *to = (last + 1..steering_rad.len())
-            .filter(|&k| near(last, k) && jumped(k))
-            .max()
-            .map_or(last, |k| k - 1);
-    }
-    found
+    let burst = |(first, last, size): (usize, usize, f64)| {
+        let from = (1..=first).filter(|&k| near(k, first) && jumped(k)).min();
+        let to = (last + 1..steering_rad.len()).filter(|&k| near(last, k) && jumped(k)).max();
+        (from.is_some() || to.is_some()).then(|| (from.unwrap_or(first), to.map_or(last, |k| k - 1), size))
+    };
+    spans.into_iter().filter_map(burst).collect()
 }
 
 /// First and last places of bursts of at least so many samples, and how high the jump is.
