@@ -84,14 +84,6 @@ pub fn masked(sequence: &StateSequence) -> Result<Masked, SignalError> {
         ("v_y_mps", &sequence.v_y_mps, MOST_MPS2),
         ("yaw_rate_radps", &sequence.yaw_rate_radps, MOST_RADPS2),
     ];
-    let steering: Vec<f64> = sequence.steering_rad.iter().map(|&v| f64::from(v)).collect();
-    let mut steered = bursts_at(&time_s, &steering, MOST_RADPS, 1);
-    steered.extend(beyond_lock(&time_s, &steering));
-    for (from, to, size) in steered {
-        keep[from..=to].fill(false);
-        let (from_s, to_s) = (time_s[from], time_s[to]);
-        out.bad.push(BadSpan { channel: "steering_rad", kind: BadKind::Burst, from_s, to_s, size });
-    }
     for (name, values, most_rate) in moving {
         let values: Vec<f64> = values.iter().map(|&v| f64::from(v)).collect();
         for (from, to, size) in bursts_at(&time_s, &values, most_rate, 2) {
@@ -114,6 +106,19 @@ pub fn masked(sequence: &StateSequence) -> Result<Masked, SignalError> {
     if left_out as f64 > MOST_SHARE * sequence.len() as f64 {
         keep.fill(true);
         out.bad.clear();
+    }
+    // However many: no wheel follows them. A whole drive in another unit has no jumps that lead to it.
+    let steering: Vec<f64> = sequence.steering_rad.iter().map(|&v| f64::from(v)).collect();
+    let mut steered = beyond_lock(&time_s, &steering);
+    let jumped = bursts_at(&time_s, &steering, MOST_RADPS, 1).into_iter();
+    // A jump to what no wheel does comes from what one does.
+    let beside = |b: &(usize, usize, f64)| steered.iter().any(|s| b.1 + 1 == s.0 || s.1 + 1 == b.0);
+    let apart: Vec<_> = jumped.filter(|b| !beside(b)).collect();
+    steered.extend(apart);
+    for (from, to, size) in steered {
+        keep[from..=to].fill(false);
+        let (from_s, to_s) = (time_s[from], time_s[to]);
+        out.bad.push(BadSpan { channel: "steering_rad", kind: BadKind::Burst, from_s, to_s, size });
     }
     for (name, values, _) in moving {
         let values: Vec<f64> = values.iter().map(|&v| f64::from(v)).collect();
@@ -343,17 +348,20 @@ mod tests {
     fn seconds_of_steering_in_degrees_are_left_out_and_a_flick_to_full_lock_is_not() {
         let mut drive = drive();
         drive.steering_rad.iter_mut().for_each(|d| *d *= 0.4);
-        // Through zero at 6.28 s, and never beyond any lock there; at the beginning, at the end, and for longer than a burst.
-        for (from, to) in [(600, 640), (617, 629), (0, 60), (950, 1000), (300, 800)] {
+        // Through zero at 6.28 s, and never beyond any lock there; at the beginning, at the end, and for a third of the drive.
+        for (from, to) in [(600, 640), (617, 629), (0, 60), (950, 1000), (100, 400)] {
             let mut harmed = drive.clone();
             harmed.steering_rad[from..to].iter_mut().for_each(|d| *d *= 57.3);
             let out = masked(&harmed).unwrap();
             let steered = out.sequence.steering_rad.iter().fold(0.0_f32, |most, d| most.max(d.abs()));
-            let kept = if to - from > 200 { 1000 } else { 1000 - (to - from) };
-            // All of it: that is no burst, and said of the whole drive.
-            assert!(steered < 0.45 || kept == 1000, "{from} {to}: {steered}");
+            let kept = 1000 - (to - from);
+            assert!(steered < 0.45, "{from} {to}: {steered}");
             assert!(out.sequence.len().abs_diff(kept) <= 2, "{from} {to}: {}", out.sequence.len());
         }
+        // All of it: that is no burst, and said of the whole drive.
+        let mut degrees = drive.clone();
+        degrees.steering_rad.iter_mut().for_each(|d| *d *= 57.3);
+        assert!(masked(&degrees).unwrap().bad.is_empty());
         let mut flick = drive.clone();
         for (k, d) in flick.steering_rad[450..550].iter_mut().enumerate() {
             // To the other lock and back, a tenth of a radian a sample.
