@@ -9,6 +9,7 @@ from torch import nn
 
 from render import CLASSES
 
+BACKBONES = ("mobilenet_v3_small", "resnet18", "efficientnet_b0")
 BASIS_FILE = Path(__file__).parents[3] / "params" / "friction_basis.yaml"
 
 
