@@ -2,7 +2,7 @@
 
     python evaluate.py table PHOTOGRAPHS --models a.onnx b.onnx --out DIR      Table I, predictions, reliability
     python evaluate.py pictures PHOTOGRAPHS --split test --out DIR             honest and bad pictures as files
-    python evaluate.py gates READINGS.csv --out FILE.csv                       rates, from the Rust pipeline's readings
+    python evaluate.py gates READINGS.csv --out FILE.csv                       rates, from the Rust pipeline's readings; those of light.py, too
 
 The pictures are read by the program itself: `cargo run --example read_pictures DIR > READINGS.csv`.
 """
@@ -25,7 +25,6 @@ from noise import Bank
 from textures import OUTLIERS, ROADS, SPLIT_FILE, UNSEEN_OUTLIERS, load_photographs
 
 TEST_SEED, PICTURE_SEED = {"val": 101, "test": 102}, {"val": 201, "test": 202}
-WIDE_SIGMA = 0.2
 
 
 def session(path):
@@ -202,16 +201,15 @@ def gates(args):
         families.setdefault(row["family"], []).append(row)
     table_rows = []
     for family, rows in sorted(families.items()):
-        refused = np.array([r["reason"] != "" for r in rows])
-        wide = np.array([float(r["sigma"]) >= WIDE_SIGMA for r in rows])
-        mu = np.array([float(r["mu"]) for r in rows])
+        read = [r for r in rows if r["reason"] == ""]
+        mean = lambda key: round(float(np.mean([float(r[key]) for r in read])), 3) if read else ""  # noqa: E731
         reasons = {}
         for r in rows:
             if r["reason"]:
                 reasons[r["reason"]] = reasons.get(r["reason"], 0) + 1
-        table_rows.append({"family": family, "pictures": len(rows), "refused": round(refused.mean(), 3),
-                           "refused_or_wide": round((refused | wide).mean(), 3),
-                           "believed_above_0.7": round((~refused & ~wide & (mu > 0.7)).mean(), 3),
+        table_rows.append({"family": family, "pictures": len(rows), "refused": round(1 - len(read) / len(rows), 3),
+                           "mu_of_the_rest": mean("mu"), "sigma_of_the_rest": mean("sigma"),
+                           "rest_below_0.7": round(float(np.mean([float(r["mu"]) < 0.7 for r in read])), 3) if read else "",
                            "reasons": " ".join(f"{k}:{v}" for k, v in sorted(reasons.items()))})
     with open(args.out, "w", newline="") as f:
         writer = csv.DictWriter(f, table_rows[0])

@@ -77,7 +77,7 @@ pub fn appearance(picture: &RgbPicture, scene: [f64; 2]) -> [f64; APPEARANCE.len
         level.unwrap_or(255) as f64
     };
     let spread = spreads[0] + 2.0;
-    let steps = gradients(&luma, columns);
+    let steps = gradients::<5>(&luma, columns);
     let texture = |k: usize| ((steps[k] + 0.3) / spread).ln();
     let third = |from: usize| {
         let part = &luma[from * columns..(from + rows / 3) * columns];

@@ -16,9 +16,9 @@ pub struct QualityStatistics {
     pub noise: f64,
     /// Mean step of luma between neighbouring blocks of 4 x 4 pixels: what a picture keeps unless it is badly blurred.
     pub structure: f64,
-    /// Mean step of luma over 8 pixels over that over 2, and over 16 over 4. Independent noise of the pixels gives a quarter, or a third after
-    /// a resize; whatever a lens has formed gives more.
-    pub coarseness: [f64; 2],
+    /// Mean step of luma over 8 pixels over that over 2, over 16 over 4, and over 32 over 8. Independent noise of the pixels gives a quarter each, and
+    /// more only in the first where a resize or the camera's own filter has smoothed it; whatever a lens has formed gives more.
+    pub coarseness: [f64; 3],
 }
 
 impl QualityStatistics {
@@ -65,8 +65,8 @@ fn noise(luma: &[i32], width: usize) -> f64 {
     (std::f64::consts::PI / 2.0).sqrt() / 6.0 * sum as f64 / count.max(1) as f64
 }
 
-/// Mean absolute differences between neighbours, along rows and columns, of the picture and of the same halved in size four times.
-pub(crate) fn gradients(luma: &[f32], width: usize) -> [f64; 5] {
+/// Mean absolute differences between neighbours, along rows and columns, of the picture and of the same halved in size again and again.
+pub(crate) fn gradients<const LEVELS: usize>(luma: &[f32], width: usize) -> [f64; LEVELS] {
     let (mut level, mut width) = (luma.to_vec(), width);
     std::array::from_fn(|k| {
         if k > 0 {
@@ -101,10 +101,11 @@ fn halve(level: &[f32], width: usize) -> (Vec<f32>, usize) {
 }
 
 /// See [`QualityStatistics::coarseness`].
-fn coarseness(luma: &[i32], width: usize) -> [f64; 2] {
+fn coarseness(luma: &[i32], width: usize) -> [f64; 3] {
     let luma: Vec<f32> = luma.iter().map(|v| *v as f32).collect();
-    let steps = gradients(&luma, width);
-    [(1, 3), (2, 4)].map(|(fine, coarse)| if steps[fine] > 0.0 { steps[coarse] / steps[fine] } else { 1.0 })
+    let steps = gradients::<6>(&luma, width);
+    [(1, 3), (2, 4), (3, 5)]
+        .map(|(fine, coarse)| if steps[fine] > 0.0 { steps[coarse] / steps[fine] } else { 1.0 })
 }
 
 /// Mean absolute second difference of the means of 4 x 4 blocks, along rows and columns.
@@ -148,8 +149,8 @@ pub struct QualityLimits {
     pub most_noise: f64,
     /// Structure below which the picture is blurred or blank, levels.
     pub least_structure: f64,
-    /// Coarseness at and below which, both figures, the picture is nothing but noise of the sensor.
-    pub least_coarseness: [f64; 2],
+    /// Coarseness at and below which, in all figures, the picture is nothing but noise of the sensor.
+    pub least_coarseness: [f64; 3],
 }
 
 impl Default for QualityLimits {
@@ -160,7 +161,7 @@ impl Default for QualityLimits {
             most_saturated: 0.6,
             most_noise: 20.0,
             least_structure: 0.25,
-            least_coarseness: [0.36, 0.33],
+            least_coarseness: [0.45, 0.33, 0.36],
         }
     }
 }
@@ -183,7 +184,8 @@ impl QualityLimits {
     }
 
     fn is_flat_noise(&self, seen: &QualityStatistics) -> bool {
-        seen.noise > 0.5 && (0..2).all(|k| seen.coarseness[k] < self.least_coarseness[k])
+        seen.noise > 0.5
+            && seen.coarseness.iter().zip(self.least_coarseness).all(|(seen, least)| *seen < least)
     }
 }
 
@@ -210,6 +212,28 @@ mod tests {
         grey(224, |_, _| 128.0 + sigma * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0))
     }
 
+    /// White noise of a picture of 448 pixels, smoothed as by a Gaussian of 1.2 pixels and halved.
+    fn smoothed_and_halved(sigma: f64) -> RgbPicture {
+        const SIDE: usize = 448;
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        let white: Vec<f64> = (0..SIDE * SIDE)
+            .map(|_| sigma * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0))
+            .collect();
+        let weights: Vec<f64> = (-4..=4).map(|i| (-f64::from(i * i) / (2.0 * 1.2 * 1.2)).exp()).collect();
+        let sum: f64 = weights.iter().sum();
+        let smooth = |of: &dyn Fn(usize) -> f64, at: usize| {
+            let near = |k: usize| of((at + SIDE + k - 4) % SIDE);
+            weights.iter().enumerate().map(|(k, w)| w / sum * near(k)).sum::<f64>()
+        };
+        let rows: Vec<f64> =
+            (0..SIDE * SIDE).map(|i| smooth(&|x| white[i / SIDE * SIDE + x], i % SIDE)).collect();
+        let whole = |x: usize, y: usize| smooth(&|y| rows[y * SIDE + x], y);
+        grey(224, |x, y| {
+            let (x, y) = (2 * x as usize, 2 * y as usize);
+            128.0 + 0.25 * (whole(x, y) + whole(x + 1, y) + whole(x, y + 1) + whole(x + 1, y + 1))
+        })
+    }
+
     #[test]
     fn the_noise_estimate_finds_the_noise_that_was_put_in() {
         for sigma in [3.0, 10.0, 25.0] {
@@ -234,6 +258,10 @@ mod tests {
         // Noise of the sensor and nothing else, however weak.
         for sigma in [2.0, 5.0, 12.0] {
             assert_eq!(reason(&noisy(sigma)), Some(Reason::Noisy));
+        }
+        // Nor where a camera of twice the pixels has smoothed it by one of its own.
+        for sigma in [8.0, 14.0, 24.0] {
+            assert_eq!(reason(&smoothed_and_halved(sigma)), Some(Reason::Noisy), "{sigma}");
         }
         let grain =
             |x: u32, y: u32| f64::from((x / 9 * 37 + y / 9 * 61) % 17) + f64::from((x * 7 + y * 3) % 5);
