@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::Args;
-use gripsight_bag::{Bag, TopicMap, decode, from_cdr};
+use gripsight_bag::{Bag, Reading, TopicMap, decode, from_cdr};
 use gripsight_friction::{
     Basis, Calibration, Estimate, Frame, FrameData, FrictionEstimator, Look, Motion, Odometer, OnnxEmbedder,
     OnnxRuntime, RawPicture, Settings, find_embedding, find_library, find_model,
@@ -75,7 +75,7 @@ pub(crate) struct Shot<'a> {
     pub(crate) motion: Motion,
 }
 
-/// Hands every picture of one topic of a bag to `take`, in the order recorded; gives the topic.
+/// Hands every picture of one topic of a bag to `take`, in the order recorded; gives the topic. A message that cannot be read costs itself.
 pub(crate) fn each_picture(
     path: &Path,
     topics: &TopicMap,
@@ -88,6 +88,7 @@ pub(crate) fn each_picture(
     let odometry = streams.as_ref().and_then(|s| s.topic(gripsight_bag::Role::Odom));
     let raw = bag.topics().iter().any(|t| t.name == wanted && t.type_name == Image::TYPE);
     let mut odometer = Odometer::default();
+    let mut reading = Reading::new(&wanted);
     for message in bag.messages() {
         let message = match message {
             Ok(message) => message,
@@ -100,7 +101,7 @@ pub(crate) fn each_picture(
             take(&Shot { stamp_ns, data, motion: Motion { distance_m: odometer.at(stamp_ns) } })
         };
         if topic == wanted && raw {
-            let picture: Image = from_cdr(data)?;
+            let Some(picture) = reading.take(message.log_time, from_cdr::<Image>(data)) else { continue };
             let raw = RawPicture {
                 width: picture.width,
                 height: picture.height,
@@ -111,7 +112,9 @@ pub(crate) fn each_picture(
             };
             shot(picture.header.stamp, FrameData::Raw(raw))?;
         } else if topic == wanted {
-            let picture: CompressedImage = from_cdr(data)?;
+            let Some(picture) = reading.take(message.log_time, from_cdr::<CompressedImage>(data)) else {
+                continue;
+            };
             shot(picture.header.stamp, FrameData::Compressed(&picture.data))?;
         } else if odometry == Some(topic) {
             // A stack's own type has no speed here: pictures are then averaged by number.
@@ -119,6 +122,9 @@ pub(crate) fn each_picture(
                 odometer.push(decode::stamp_ns(odometry.header.stamp), odometry.twist.twist.linear.x);
             }
         }
+    }
+    if let Some(left_out) = reading.done()? {
+        tracing::warn!("{}: {left_out}", path.display());
     }
     Ok(wanted)
 }

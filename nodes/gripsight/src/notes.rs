@@ -21,13 +21,7 @@ pub(crate) fn read_notes(report: &ReadReport) -> Vec<String> {
     let recorded =
         report.recorded_sequences.iter().map(|topic| format!("state sequences recorded on {topic}"));
     let first = taken.first_problem.iter().map(|problem| format!("first of those left out: {problem}"));
-    let unreadable = report.unreadable.iter().map(|u| {
-        let count = match u.messages {
-            1 => "a message that cannot be read is".to_owned(),
-            n => format!("{n} messages that cannot be read are"),
-        };
-        format!("{}: {count} left out (first: {})", u.topic, u.first)
-    });
+    let unreadable = report.unreadable.iter().map(ToString::to_string);
     let cut = report.truncated.clone().into_iter();
     cut.chain(unreadable)
         .chain(recorded)

@@ -23,6 +23,7 @@ mod health;
 mod info;
 mod inject;
 mod propose;
+mod reading;
 mod records;
 mod recover;
 mod rosbag2;
@@ -40,10 +41,11 @@ pub use error::BagError;
 pub use info::{BagInfo, TopicInfo, Usable, info};
 pub use inject::inject;
 pub use propose::{Proposal, propose};
+pub use reading::{Reading, Unreadable};
 pub use recover::{Recovered, recover, refuse_overwriting};
 pub use sequence::{
     CHUNK_LIMIT_BYTES, Reassembler, RecordedSequence, read_recorded_sequences, sequence_to_messages,
 };
-pub use telemetry::{ReadReport, Unreadable, read_measurements, read_sequences};
+pub use telemetry::{ReadReport, read_measurements, read_sequences};
 pub use topics::{LiveStreams, MappedTopic, Mapping, Role, Streams, TopicMap};
 pub use writer::BagWriter;

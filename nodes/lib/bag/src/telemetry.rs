@@ -7,7 +7,7 @@ use gripsight_signals::{Measurement, Sequencer, StateSequence, Taken, TopicHealt
 use serde::Serialize;
 
 use crate::sequence::read_recorded;
-use crate::{Bag, BagError, Streams, TopicMap, decode, health};
+use crate::{Bag, BagError, Reading, Streams, TopicMap, Unreadable, decode, health};
 
 /// What reading a bag met.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -30,53 +30,6 @@ pub struct ReadReport {
     pub truncated: Option<String>,
     /// The topic of the recorded sequences that were used instead of the streams.
     pub recorded_sequences: Option<String>,
-}
-
-/// Messages of a topic whose bytes are none of its type.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Unreadable {
-    /// The topic.
-    pub topic: String,
-    /// How many there are: fewer than were read.
-    pub messages: usize,
-    /// The first of them, and what is wrong with it.
-    pub first: String,
-}
-
-/// What was read of a topic and what could not be.
-#[derive(Default)]
-struct Reading {
-    read: usize,
-    unreadable: usize,
-    first: Option<BagError>,
-}
-
-impl Reading {
-    /// Counts a message; `None` where it is left out.
-    fn take<T>(&mut self, message: Result<T, BagError>) -> Option<T> {
-        match message {
-            Ok(message) => {
-                self.read += 1;
-                Some(message)
-            }
-            Err(error) => {
-                self.unreadable += 1;
-                self.first.get_or_insert(error);
-                None
-            }
-        }
-    }
-
-    /// What was left out; the first error where that is no exception.
-    fn done(self, topic: String) -> Result<Option<Unreadable>, BagError> {
-        match self.first {
-            Some(error) if self.unreadable >= self.read => Err(error),
-            Some(error) => {
-                Ok(Some(Unreadable { topic, messages: self.unreadable, first: error.to_string() }))
-            }
-            None => Ok(None),
-        }
-    }
 }
 
 /// Every measurement of a bag in the order of recording. NaN and stamps that go back are left out
@@ -104,21 +57,17 @@ fn measurements_of(bag: &Bag, topics: &TopicMap) -> Result<(Vec<Measurement>, Re
             Err(error) => return Err(error),
         };
         let topic = &message.channel.topic;
-        let reading = readings.entry(topic.clone()).or_default();
+        let reading = readings.entry(topic.clone()).or_insert_with(|| Reading::new(topic));
         for mapped in report.streams.mapped().iter().filter(|mapped| mapped.topic == *topic) {
-            let measurement = mapped
-                .measurement(&message.data, message.log_time)
-                .map_err(|error| error.in_message(topic, measurements.len(), message.log_time));
-            if let Some(measurement) = reading.take(measurement) {
+            let measurement = mapped.measurement(&message.data, message.log_time);
+            if let Some(measurement) = reading.take(message.log_time, measurement) {
                 measurements.push(measurement);
                 log_times_ns.push(message.log_time);
             }
         }
         let Some(role) = report.streams.role(topic) else { continue };
-        let count = &mut report.counts[role as usize];
-        let measurement = decode::measurement(role, &message.data)
-            .map_err(|error| error.in_message(topic, *count, message.log_time));
-        match reading.take(measurement) {
+        report.counts[role as usize] += 1;
+        match reading.take(message.log_time, decode::measurement(role, &message.data)) {
             Some(Some(measurement)) => {
                 measurements.push(measurement);
                 log_times_ns.push(message.log_time);
@@ -126,10 +75,9 @@ fn measurements_of(bag: &Bag, topics: &TopicMap) -> Result<(Vec<Measurement>, Re
             Some(None) => report.without_content += 1,
             None => {}
         }
-        *count += 1;
     }
-    for (topic, reading) in readings {
-        report.unreadable.extend(reading.done(topic)?);
+    for reading in readings.into_values() {
+        report.unreadable.extend(reading.done()?);
     }
     if measurements.is_empty() {
         return Err(BagError::Empty { path: bag.path().to_owned() });
