@@ -267,7 +267,8 @@ fn an_assumed_grip_is_no_promise() {
     approx::assert_relative_eq!(careful.grip(), 0.5 * start, max_relative = 1e-2);
     drive(&mut careful, |_| 0.8, 0.0, 60.0);
     approx::assert_relative_eq!(careful.grip(), start, max_relative = 2e-2);
-    // Roads that give less are noticed before the assumed grip is driven with. A slide may end anywhere: most do on the track.
+    // Roads that give less are noticed before the assumed grip is driven with, and without going wide: the plan went no further than a step beyond what
+    // the car had turned with. (A fifth at a time it left the track by up to 2 m.)
     let mut worst_m = Vec::new();
     for k in 0..15 {
         let road = 0.30 + 0.01 * f64::from(k);
@@ -275,10 +276,7 @@ fn an_assumed_grip_is_no_promise() {
         worst_m.push(drive(&mut slippery, |_| road, 0.0, 25.0));
         assert!(slippery.grip() < 1.1 * road, "{road}: grip {}", slippery.grip());
     }
-    // 0.35.
-    assert!(worst_m[5] < 0.4, "{worst_m:?}");
-    worst_m.sort_by(f64::total_cmp);
-    assert!(worst_m[7] < 0.4, "{worst_m:?}");
+    assert!(worst_m.iter().all(|worst_m| *worst_m < 0.4), "{worst_m:?}");
 }
 
 #[test]
