@@ -298,7 +298,7 @@ fn a_comparison_speaks_of_what_has_changed() {
     for (verdict, words) in [
         (Verdict::Effects, "What has changed since monday.mcap is steering delay"),
         (Verdict::TireRetuneOnly, "The tires have changed since monday.mcap"),
-        (Verdict::NoGap, "No effect has changed since monday.mcap as far as these data tell, but 3.1 times"),
+        (Verdict::NoGap, "Nothing has changed since monday.mcap as far as these data tell; likeliest is"),
         (Verdict::NoneOfThese, "Something has changed since monday.mcap"),
     ] {
         d.verdict = verdict;
@@ -363,7 +363,7 @@ fn a_simulator_s_drive_is_the_other_end_of_a_change_that_leads_to_the_car() {
     for (verdict, words) in [
         (Verdict::Effects, "What differs from the simulator (sim.mcap) to the car is steering delay"),
         (Verdict::TireRetuneOnly, "The tires differ from the simulator (sim.mcap) to the car"),
-        (Verdict::NoGap, "No effect differs from the simulator (sim.mcap) to the car as far as"),
+        (Verdict::NoGap, "Nothing differs from the simulator (sim.mcap) to the car as far as"),
         (Verdict::NoneOfThese, "Something differs from the simulator (sim.mcap) to the car that no effect"),
     ] {
         d.verdict = verdict;

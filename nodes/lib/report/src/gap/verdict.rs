@@ -79,13 +79,16 @@ pub(super) fn sentence(d: &Diagnosis, before: Option<Before<'_>>) -> String {
             (Some(have), false) => format!("The tires {have}; {times} remains."),
             (None, false) => format!("Other tires are all that helps; {times} remains."),
         },
-        Verdict::NoGap if !tires_suffice(d) => {
-            let what = match &has {
-                Some(has) => format!("No effect {has}"),
-                None => "No effect of the library is at work".to_owned(),
-            };
-            format!("{what} as far as these data tell, but {times} remains{}.", likeliest(d))
-        }
+        Verdict::NoGap if !tires_suffice(d) => match &has {
+            Some(has) => format!(
+                "Nothing {has} as far as these data tell{}; {times} remains, which does not set them apart.",
+                likeliest(d)
+            ),
+            None => format!(
+                "No effect of the library is at work as far as these data tell, but {times} remains{}.",
+                likeliest(d)
+            ),
+        },
         Verdict::NoGap => match &has {
             Some(has) => format!("Nothing {has} but for noise and the model's usual imperfection."),
             None => "No gap: model and car agree within the noise and the model's usual imperfection.".into(),
