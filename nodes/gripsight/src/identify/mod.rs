@@ -259,7 +259,7 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
                 .with_context(|| format!("cannot take the effects out of {}", args.bag().display()))?;
         }
     }
-    let notes = data_notes(&report, model.as_ref());
+    let data = data_notes(&report, model.as_ref());
     timing.reading_s = start.elapsed().as_secs_f64();
     let belief = args.belief(&topics, &sequences);
     timing.camera_s = start.elapsed().as_secs_f64() - timing.reading_s;
@@ -286,7 +286,7 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
         for (k, OnOneFloor { sequence, mut outcome }) in found.parts.into_iter().enumerate() {
             together::compare(args, &alone, &vehicle, &mut outcome)?;
             let writing = Instant::now();
-            let notes: Vec<String> = notes.iter().cloned().chain(signal_notes(&outcome.recorded)).collect();
+            let notes: Vec<String> = data.iter().cloned().chain(signal_notes(&outcome.recorded)).collect();
             let out = floors::folder(&args.out, k, parts)?;
             let files = write(args, &out, &vehicle, &notes, &sequence, &outcome)?;
             timing.writing_s += writing.elapsed().as_secs_f64();
@@ -298,12 +298,12 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
                 if outcome.replaces(previous.as_ref()) {
                     previous = outcome.accepted_set().or(previous);
                 }
-                last = Some((sequence, outcome, files));
+                last = Some((sequence, outcome, notes, files));
                 break;
             }
         }
     }
-    let Some((sequence, result, mut files)) = last else {
+    let Some((sequence, result, notes, mut files)) = last else {
         bail!("{}: no state sequence", args.bag().display())
     };
     let before = start.elapsed().as_secs_f64();
@@ -317,7 +317,7 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
     fs::write(&timing_file, serde_json::to_string_pretty(&timing)? + "\n")
         .with_context(|| format!("cannot write {}", timing_file.display()))?;
     print!("{}", windows.notices());
-    print!("{}", summary::summary(&car_name(args, &vehicle), &result, &files, &timing));
+    print!("{}", summary::summary(&car_name(args, &vehicle), &result, &notes, &files, &timing));
     Ok(if result.accepted { Outcome::Done } else { Outcome::NotAccepted })
 }
 

@@ -9,8 +9,14 @@ use gripsight_report::{drive_train, estimate, peak_friction, status, understeer}
 
 use super::progress::Timing;
 
-/// The result in about 25 lines.
-pub(super) fn summary(car: &str, result: &Outcome, files: &[PathBuf], timing: &Timing) -> String {
+/// The result in about 40 lines. `notes`: what is to be said of the data.
+pub(super) fn summary(
+    car: &str,
+    result: &Outcome,
+    notes: &[String],
+    files: &[PathBuf],
+    timing: &Timing,
+) -> String {
     let mut text = String::new();
     let verdict = status(result);
     let _ = writeln!(text, "{car}: {verdict}");
@@ -55,6 +61,9 @@ pub(super) fn summary(car: &str, result: &Outcome, files: &[PathBuf], timing: &T
     }
     for drive in &result.drive_next {
         let _ = writeln!(text, "{:<28}{drive}", "drive next");
+    }
+    for note in notes {
+        let _ = writeln!(text, "{:<28}{note}", "data");
     }
     text.push('\n');
     for file in files {
