@@ -6,6 +6,7 @@
 //! envelope priors FROM TO DURATION_S         the same drives with friction priors off by -0.6 to 0.6, of any sigma
 //! envelope grip FROM TO                      drives whose grip falls, or does not, while the set found before is watched
 //! envelope floors FROM TO                    drives over two floors: what the set of each promises
+//! envelope paces FROM TO                     the same on one floor at two paces: none should be cut
 //! ```
 //!
 //! Writes a row a run to standard output (csv); `envelope.py` beside the results makes the tables of it. No truth is read by the product.
@@ -182,12 +183,17 @@ fn drawn(seed: u64, duration_s: f64) -> Result<(Run, PerAxle<Known>, f64, f64)> 
 
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let Some((mode, rest)) = arguments.split_first() else { bail!("draws, bags, priors, grip or floors?") };
+    let Some((mode, rest)) = arguments.split_first() else {
+        bail!("draws, bags, priors, grip, floors or paces?")
+    };
     if let ("grip", [from, to]) = (mode.as_str(), rest) {
         return grip::run(from.parse()?, to.parse()?);
     }
     if let ("floors", [from, to]) = (mode.as_str(), rest) {
-        return floors::run(from.parse()?, to.parse()?);
+        return floors::run(from.parse()?, to.parse()?, true);
+    }
+    if let ("paces", [from, to]) = (mode.as_str(), rest) {
+        return floors::run(from.parse()?, to.parse()?, false);
     }
     println!("{}", header());
     match (mode.as_str(), rest) {
