@@ -120,7 +120,7 @@ def arguments():
     p.add_argument("--init-weights", help="a state_dict to start from; layers of another shape are left out and named")
     p.add_argument("--plain-share", type=float, default=0.0, help="share of the photographs shown as they are, as dry")
     p.add_argument("--finer-share", type=float, default=0.0, help="share of the renders taken by a camera of more pixels")
-    p.add_argument("--minutes", type=float, help="end the run, and its rate's schedule, after so much time of the processor, not after all steps")
+    p.add_argument("--minutes", type=float, help="end the run, and its rate's schedule, after so much time of the processor (on a GPU: of the clock), not after all steps")
     p.add_argument("--clip", type=float, help="largest norm of the gradient")
     p.add_argument("--bfloat16", action="store_true", help="forward and backward in bfloat16 where torch's autocast allows")
     p.add_argument("--seed", type=int, default=2024)

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use gripsight_identification::{Outcome, Range};
 use gripsight_report::text::{interval, significant, with_interval};
-use gripsight_report::{drive_train, estimate, peak_friction, status, understeer};
+use gripsight_report::{UNKNOWN, drive_train, estimate, peak_friction, status, understeer};
 
 use super::progress::Timing;
 
@@ -30,8 +30,14 @@ pub(super) fn summary(
     }
     signals(&mut text, result);
     text.push('\n');
-    for [title, value] in drive_train(&result.longitudinal) {
+    let (unknown, known): (Vec<_>, Vec<_>) =
+        drive_train(&result.longitudinal).into_iter().partition(|[_, value]| value == UNKNOWN);
+    for [title, value] in known {
         let _ = writeln!(text, "{title:<28}{value}");
+    }
+    if !unknown.is_empty() {
+        let titles: Vec<String> = unknown.into_iter().map(|[title, _]| title).collect();
+        let _ = writeln!(text, "{UNKNOWN:<28}{}", titles.join(", "));
     }
     let r = &result.rmse;
     let turns = if result.converged { "converged" } else { "not converged" };

@@ -161,6 +161,7 @@ impl Default for QualityLimits {
             most_saturated: 0.6,
             most_noise: 20.0,
             least_structure: 0.25,
+            // The largest of 60 pictures of `training/light.py --split val`: 0.42, 0.33, 0.36.
             least_coarseness: [0.45, 0.33, 0.36],
         }
     }

@@ -38,7 +38,8 @@ pub use error::ReportError;
 pub use gap::{Before, GapInput, gap_page, gap_text};
 #[cfg(feature = "identification")]
 pub use identification::{
-    IdentificationInput, drive_train, estimate, identification_page, peak_friction, status, understeer,
+    IdentificationInput, UNKNOWN, drive_train, estimate, identification_page, peak_friction, status,
+    understeer,
 };
 pub use page::Header;
 pub use role::Role;

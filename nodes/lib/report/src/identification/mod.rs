@@ -7,7 +7,7 @@ mod words;
 use gripsight_identification::{Method, Outcome, PerAxle, Source, Status};
 use maud::html;
 
-pub use words::{drive_train, estimate, peak_friction, status, understeer};
+pub use words::{UNKNOWN, drive_train, estimate, peak_friction, status, understeer};
 
 use crate::page::{Tone, figure, list, page, section};
 use crate::text::{fixed, percent, significant, with_interval};

@@ -52,6 +52,9 @@ pub fn understeer(found: &Handling) -> String {
     format!("{value} ({interval}) up to {} m/s2: {says}", significant(found.up_to_a_y_mps2, 2))
 }
 
+/// What stands in the place of a figure that the data do not tell.
+pub const UNKNOWN: &str = "unknown";
+
 /// What a drive tells of the drive train, a line each: what it is and what was found.
 #[must_use]
 pub fn drive_train(found: &Longitudinal) -> Vec<[String; 2]> {
@@ -65,7 +68,7 @@ pub fn drive_train(found: &Longitudinal) -> Vec<[String; 2]> {
     let figures = figures.map(|(title, told)| {
         let value = match told {
             Told::Known(e) => estimate(e),
-            Told::Unknown => "unknown".to_owned(),
+            Told::Unknown => UNKNOWN.to_owned(),
         };
         [title.to_owned(), value]
     });
