@@ -47,9 +47,15 @@ pub(crate) fn take(driver: &mut Driver, message: &ExtendedModel, vehicle_hash: &
 
 fn said(names: &str, trial: &Trial) -> String {
     let [v_y, yaw_rate] = [trial.v_y_mps, trial.yaw_rate_radps];
+    let later = trial.later_s.map(|by_s| format!("; a steering {:.0} ms later would do better", 1e3 * by_s));
     format!(
-        "{names}: over {:.1} s it predicts v_y to {:.4} m/s and yaw rate to {:.4} rad/s, the model in use to {:.4} and {:.4}",
-        trial.driven_s, v_y[1], yaw_rate[1], v_y[0], yaw_rate[0]
+        "{names}: over {:.1} s it predicts v_y to {:.4} m/s and yaw rate to {:.4} rad/s, the model in use to {:.4} and {:.4}{}",
+        trial.driven_s,
+        v_y[1],
+        yaw_rate[1],
+        v_y[0],
+        yaw_rate[0],
+        later.unwrap_or_default()
     )
 }
 

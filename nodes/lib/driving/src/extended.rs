@@ -9,7 +9,7 @@
 
 use gripsight_vehicle::{MagicFormula, PacejkaParameters};
 
-use crate::{Actuator, CarState};
+use crate::{Actuator, CarState, TireSet};
 
 /// What is named; `None` of what is not.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -133,10 +133,17 @@ impl Named {
         scaled(set, self.grip)
     }
 
-    /// The tires to plan and steer with: both axles with the grip of the one that lost more. A steering table of a car that oversteers asks for less
-    /// angle the more the car is to turn, and spins it.
-    pub(crate) fn planned(&self, set: &PacejkaParameters) -> PacejkaParameters {
-        scaled(set, self.grip.map(|[front, rear]| [front.min(rear); 2]))
+    /// The set to plan and steer with: both axles with the grip of the one that lost more, and what was shown and is likely of it with them. A steering
+    /// table of a car that oversteers asks for less angle the more the car is to turn, and spins it.
+    pub(crate) fn planned(&self, set: &TireSet) -> TireSet {
+        let over = self.grip.map_or(1.0, |[front, rear]| front.min(rear));
+        TireSet {
+            tires: scaled(&set.tires, Some([over; 2])),
+            // The same curve, smaller: a slip that gave a force gives a share of it at that share of the slip.
+            valid_slip_rad: set.valid_slip_rad.map(|slip_rad| over * slip_rad),
+            likely_peaks: set.likely_peaks.map(|peaks| peaks.map(|peak| over * peak)),
+            ..*set
+        }
     }
 }
 

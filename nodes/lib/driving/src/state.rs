@@ -70,13 +70,18 @@ const STEP_S: f64 = 0.01;
 /// Time constants of a lag after which it is over.
 const SETTLED: f64 = 4.0;
 
+/// From a command until the wheels are where it wants them.
+pub(crate) fn settles_s(delay_s: f64, lag_s: f64) -> f64 {
+    delay_s + SETTLED * lag_s
+}
+
 /// The wheels' angle at a time: each angle acts `delay_s` after it was asked for, and the wheels follow it with a lag. `None`: nothing was asked for.
 pub(crate) fn wheels_rad(asked: &VecDeque<Asked>, time_s: f64, delay_s: f64, lag_s: f64) -> Option<f64> {
     let at = |then_s: f64| {
         let acting = asked.iter().rev().find(|a| a.from_s <= then_s - delay_s + 1e-9);
         acting.or_else(|| asked.front()).map(|a| a.angle_rad)
     };
-    let steps = (SETTLED * lag_s / STEP_S).ceil();
+    let steps = (settles_s(0.0, lag_s) / STEP_S).ceil();
     let follows = 1.0 - (-STEP_S / lag_s.max(1e-9)).exp();
     let mut wheels = at(time_s - steps * STEP_S)?;
     for step in (0..steps as usize).rev() {

@@ -1,7 +1,8 @@
 //! A new model on the last lap's data, before it is driven with.
 //!
 //! From each tenth of a second of the lap the model predicts what will be measured of v_y and yaw rate some tenths of a second later, with the
-//! commands that were sent and the speed that was measured. A model is taken if it predicts better than the one in use, and no channel worse.
+//! commands that were sent and the speed that was measured. A model is taken if it predicts better than the one in use, no channel worse, and better than
+//! a steering that is merely late: nearly every effect predicts a late car better than none does, and none is as dangerous where it is not there.
 
 use std::collections::VecDeque;
 
@@ -22,6 +23,8 @@ const SLOW_MPS: f64 = 1.0;
 /// Squared error over that of the model in use from which a model is better, and from which a channel is worse.
 const BETTER: f64 = 0.95;
 const WORSE: f64 = 1.05;
+/// Delays that are tried beside what is named, beyond that in use.
+const LATER_S: [f64; 6] = [0.02, 0.04, 0.06, 0.09, 0.13, 0.2];
 /// Integration step.
 const SUBSTEP_S: f64 = 0.005;
 /// Longest step between two states.
@@ -141,6 +144,8 @@ pub struct Trial {
     pub yaw_rate_radps: [f64; 2],
     /// Squared errors over those of the model in use, mean of both channels.
     pub ratio: f64,
+    /// How much later than in the model in use the steering may be instead: it predicts better than what was named, of which it is no part.
+    pub later_s: Option<f64>,
     /// Whether it is driven with from now on.
     pub taken: bool,
 }
@@ -152,10 +157,21 @@ pub(crate) fn trial(memory: &Memory, used: &Model<'_>, new: &Model<'_>) -> Optio
         return None;
     }
     let (before, after) = (memory.errors(used), memory.errors(new));
-    let ratios = [0, 1].map(|k| after[k] / before[k].max(1e-12));
-    let ratio = 0.5 * (ratios[0] + ratios[1]);
+    let over = |errors: [f64; 2]| [0, 1].map(|k| errors[k] / before[k].max(1e-12));
+    let mean = |ratios: [f64; 2]| 0.5 * (ratios[0] + ratios[1]);
+    let ratios = over(after);
+    let ratio = mean(ratios);
     // What is not finite is not better.
-    let taken = ratio < BETTER && ratios.iter().all(|r| *r < WORSE);
+    let better = ratio < BETTER && ratios.iter().all(|r| *r < WORSE);
+    let later = |by_s: f64| {
+        let actuator = Actuator { delay_s: used.actuator.delay_s + by_s, ..used.actuator };
+        (by_s, mean(over(memory.errors(&Model { actuator, ..*used }))))
+    };
+    let asks = better && new.actuator == used.actuator;
+    let rivals = LATER_S.iter().take(if asks { LATER_S.len() } else { 0 }).map(|by_s| later(*by_s));
+    let least = rivals.filter(|(_, late)| *late < ratio).min_by(|a, b| a.1.total_cmp(&b.1));
+    let later_s = least.map(|(by_s, _)| by_s);
+    let taken = better && later_s.is_none();
     let both = |k: usize| [before[k].sqrt(), after[k].sqrt()];
-    Some(Trial { driven_s, v_y_mps: both(0), yaw_rate_radps: both(1), ratio, taken })
+    Some(Trial { driven_s, v_y_mps: both(0), yaw_rate_radps: both(1), ratio, later_s, taken })
 }

@@ -23,8 +23,8 @@ const WINDOW_S: f64 = 30.0;
 /// Laps before the first diagnosis or name, and from which laps count: the last name was given a lap before.
 const FIRST: usize = 2;
 const COUNT: usize = 4;
-/// Share of the grip to drive with: at the limit a late steering ends in the first corner.
-const PACE: f64 = 0.85;
+/// Share of the grip to drive with: at the limit a late steering ends in the first corner, and so does a rear axle with 85 % of its grip.
+const PACE: f64 = 0.75;
 
 /// What is wrong with the car, at a size of its class.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -198,8 +198,9 @@ impl Recent {
         for effect in diagnosis.effects.iter().filter(|e| e.accepted) {
             let value = |name: &str| effect.parameters.get(name).map(|p| p.value);
             let used = named.take_in(effect.name, value);
-            let size = effect.parameters.values().next().map_or(f64::NAN, |p| p.value);
-            words.push(format!("{} {size:.3}{}", effect.name, if used { "" } else { " (no use)" }));
+            let sizes = effect.parameters.iter().map(|(name, p)| format!(" {name} {:.3}", p.value));
+            let sizes = sizes.collect::<String>();
+            words.push(format!("{}{sizes}{}", effect.name, if used { "" } else { " (no use)" }));
         }
         Ok((named, words.join(" ")))
     }

@@ -4,7 +4,7 @@ use super::caught::{CAUGHT, Caught};
 use super::{Driver, Settings};
 use crate::Actuator;
 use crate::plan::Plan;
-use crate::state::{CarState, wheels_rad};
+use crate::state::{CarState, settles_s, wheels_rad};
 use crate::tires::{TireSet, Trust};
 
 /// Share of the most likely peak to explore up to, where the set promises less.
@@ -27,7 +27,9 @@ const SETTLES_S: f64 = 2.0;
 impl Driver {
     pub(super) fn watch(&mut self, state: &CarState) {
         let Actuator { delay_s, lag_s, .. } = self.late();
-        let seen = self.asked.front().is_some_and(|a| a.from_s <= state.stamp_s - delay_s + 1e-9);
+        // Where the wheels were before the first command, nobody knows.
+        let from_s = state.stamp_s - settles_s(delay_s, lag_s);
+        let seen = self.asked.front().is_some_and(|a| a.from_s <= from_s + 1e-9);
         let acting = wheels_rad(&self.asked, state.stamp_s, delay_s, lag_s).filter(|_| seen);
         let Some(acting) = acting else { return };
         if state.v_x_mps < 1.0 {
@@ -77,19 +79,19 @@ impl Driver {
     /// Grip to plan with.
     pub(super) fn allowed(&self) -> f64 {
         let Settings { share, step, prior_step, beyond, .. } = self.settings;
-        let base = self.known.as_ref().unwrap_or(&self.start);
-        let named = TireSet { tires: self.named.planned(&base.tires), ..*base };
-        let shown = named.grip();
+        // Who is told to use less of a known grip uses less of a likely one.
+        let of_likely = LIKELY.min(share);
+        let base = self.named.planned(self.known.as_ref().unwrap_or(&self.start));
+        let shown = base.grip();
         let careful = (UNMEASURED * self.turned).max(CAREFUL * share * shown).min(share * shown);
         let driven = self.driven.max(if base.trust == Trust::Assumed { careful } else { share * shown });
         let driven = driven.max(self.turned.min(share * self.start.grip()));
-        let over = self.named.grip.map_or(1.0, |[front, rear]| front.min(rear));
-        let likely_peak = base.likely_peaks.map(|[front, rear]| over * front.min(rear));
+        let likely_peak = base.likely_peaks.map(|[front, rear]| front.min(rear));
         let likely = likely_peak.unwrap_or(f64::INFINITY);
         // As without a set, in the middle of the lap; in smaller steps beyond what is likely.
         let assured = (ASSURED * self.turned).min(share * self.start.grip());
         let assured =
-            if self.explores() { assured.min((LIKELY * likely).max(step * self.turned)) } else { 0.0 };
+            if self.explores() { assured.min((of_likely * likely).max(step * self.turned)) } else { 0.0 };
         let proven = PROVEN.min(step) * self.driven;
         let most = (beyond * shown).max(proven);
         let bold = (step * driven).min(most);
@@ -98,20 +100,22 @@ impl Driver {
         let alone = match base.trust {
             Trust::Assumed => careful.max(self.driven).min(share * shown),
             Trust::Accepted => {
-                let peak = LIKELY * likely_peak.unwrap_or(shown);
+                let peak = of_likely * likely_peak.unwrap_or(shown);
                 bold.min(peak.max(proven_below(likely))).max(share * shown)
             }
             Trust::AcceptedWithin if base.peak_reached => {
                 bold.min((share * likely).max(proven_below(likely))).max(share * shown)
             }
-            Trust::AcceptedWithin => bold.min((LIKELY * likely).max(self.driven)).max(share * shown),
+            Trust::AcceptedWithin => bold.min((of_likely * likely).max(self.driven)).max(share * shown),
             Trust::Provisional => share * shown,
         };
         let grip = match &self.prior {
             _ if base.trust == Trust::Accepted => alone,
             // A prior below what was driven and a step is no reason to drive slower, unless nothing was shown.
             Some(prior) if base.trust == Trust::Assumed => (share * prior.grip()).min(prior_step * driven),
-            Some(prior) => (LIKELY * prior.grip().min(likely)).max(alone).min(prior_step * driven).min(most),
+            Some(prior) => {
+                (of_likely * prior.grip().min(likely)).max(alone).min(prior_step * driven).min(most)
+            }
             None => alone,
         };
         let grip = grip.max(assured);
@@ -124,7 +128,7 @@ impl Driver {
     }
 
     pub(super) fn renew(&mut self) {
-        let set = TireSet { tires: self.named.planned(&self.base().tires), ..*self.base() };
+        let set = self.named.planned(self.base());
         self.plan = Plan::new(&self.vehicle, &self.drivetrain, &self.track, &set, self.allowed());
         self.progress.planned(self.plan.grip);
         self.governor.reset();

@@ -28,7 +28,7 @@ use crate::probation::{GivenBack, Probation};
 use crate::profile::{Drivetrain, SpeedProfile};
 use crate::progress::Progress;
 use crate::pursuit::Pursuing;
-use crate::state::{Asked, CarState, DriveCommand};
+use crate::state::{Asked, CarState, DriveCommand, settles_s};
 use crate::steering::{Controller, Moment, Steering};
 use crate::tires::{TireSet, Trust};
 use crate::trial::{Memory, Model, Trial, trial};
@@ -302,7 +302,8 @@ impl Driver {
         }
         if let Some(driven) = driven {
             self.driven = driven;
-            let promised = self.known.map_or(0.0, |set| self.settings.share * set.grip());
+            let measured = self.known.or_else(|| Some(self.start).filter(|set| set.trust != Trust::Assumed));
+            let promised = measured.map_or(0.0, |set| self.settings.share * self.named.planned(&set).grip());
             self.caught.iter_mut().for_each(|caught| caught.pass(promised));
             if self.caught.is_some() || self.is_assumed() {
                 self.renew();
@@ -340,7 +341,7 @@ impl Driver {
         };
         let acceleration_mps2 = acceleration_mps2 / told.gain();
         self.asked.push_back(asked);
-        while self.asked.front().is_some_and(|a| a.from_s < state.stamp_s - 2.0 * LATEST_S) {
+        while self.asked.front().is_some_and(|a| a.from_s < state.stamp_s - settles_s(LATEST_S, LATEST_S)) {
             self.asked.pop_front();
         }
         let steering_rad = self.actuated(angle_rad);

@@ -153,6 +153,38 @@ fn the_effect_that_is_there_is_taken_and_makes_the_car_keep_its_line() {
 }
 
 #[test]
+fn wheels_that_nobody_has_steered_yet_are_not_taken_for_a_road_without_grip() {
+    let lag = Named { steering_lag_s: Some(0.15), ..Named::default() };
+    let mut driver = driver(set(0.7, Trust::Accepted));
+    driver.tell(lag);
+    let planned = driver.grip();
+    drive_with(&mut driver, |_| 0.8, &lag, 2.0);
+    assert!(!driver.held_back() && driver.grip() == planned, "{} of {planned}", driver.grip());
+}
+
+#[test]
+fn an_axle_named_with_less_grip_lowers_what_was_shown_by_as_much() {
+    // The rear axle's peak was not reached: its formula says more than the car turned with.
+    let shown = TireSet {
+        tires: PacejkaParameters { rear: tires(1.0).rear, ..tires(0.8) },
+        valid_slip_rad: [0.06, f64::INFINITY],
+        ..set(0.8, Trust::Accepted)
+    };
+    let mut driver = driver(shown);
+    let before = driver.grip();
+    driver.tell(Named { grip: Some([0.99, 0.85]), ..Named::default() });
+    approx::assert_relative_eq!(driver.grip(), 0.85 * before, max_relative = 1e-3);
+}
+
+#[test]
+fn who_is_told_to_use_less_of_the_grip_does_so_however_far_the_peak_is_known() {
+    let mut careful = with(TireSet::start(), Settings { share: 0.7, ..Settings::default() });
+    careful.take(TireSet { likely_peaks: Some([0.8; 2]), ..set(0.8, Trust::Accepted) }).unwrap();
+    drive(&mut careful, |_| 0.8, 0.0, 40.0);
+    assert!(careful.grip() <= 0.7 * 0.8 * 1.001, "{}", careful.grip());
+}
+
+#[test]
 fn an_effect_that_is_not_there_is_refused_with_its_figures() {
     let mut driver = driver(set(0.8, Trust::Accepted));
     drive(&mut driver, |_| 0.8, 0.0, 25.0);
@@ -172,6 +204,17 @@ fn an_effect_that_is_not_there_is_refused_with_its_figures() {
     }
     let nonsense = Named { steering_delay_s: Some(f64::NAN), ..none };
     assert_eq!(driver.take_named(nonsense), None);
+}
+
+#[test]
+fn what_a_late_steering_predicts_better_is_refused() {
+    let late = Named { steering_delay_s: Some(0.06), ..Named::default() };
+    let mut driver = with(set(0.7, Trust::Accepted), Settings { share: 0.7, ..Settings::default() });
+    drive_with(&mut driver, |_| 0.8, &late, 25.0);
+    let wrong = Named { yaw_rate_scale: Some(1.07), v_y_lever_arm_m: Some(0.02), ..Named::default() };
+    let trial = driver.take_named(wrong).unwrap();
+    assert!(!trial.taken && trial.ratio < 0.95 && trial.later_s == Some(0.06), "{trial:?}");
+    assert!(driver.take_named(late).unwrap().taken);
 }
 
 #[test]
