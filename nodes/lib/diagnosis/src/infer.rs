@@ -442,9 +442,27 @@ mod tests {
         let (named, stands_in) = ([EffectId::SteeringLag], [EffectId::VyBias, EffectId::SteeringLag]);
         found.stated = Some(vec![of(lag, 0, 0.2), of(bias, 3, 0.5)]);
         assert_eq!((&found.accepted()[..], &found.modelled()[..]), (&named[..], &stands_in[..]));
-        found.refute(EffectId::VyBias);
+        found.set_needless(EffectId::VyBias);
         assert_eq!((&found.accepted()[..], &found.modelled()[..]), (&named[..], &named[..]));
         found.stated = Some(vec![of(lag, 3, 0.2)]);
         assert!(found.accepted().is_empty() && found.modelled().is_empty());
+    }
+
+    #[test]
+    fn beside_a_stand_in_nothing_smaller_at_its_site_is_named() {
+        let mut found = inferred(0.06, &[]);
+        let effects = [EffectId::SteeringLag, EffectId::SteeringDelay, EffectId::VyBias];
+        let [lag, delay, bias] = effects.map(|e| found.term_of(e).unwrap());
+        let mut statement = found.statement(EffectId::SteeringLag).unwrap().clone();
+        statement.rivals.clear();
+        let of = |term, untried, closes| Statement { term, untried, closes, ..statement.clone() };
+        let named = |found: &Inferred| effects.map(|e| found.is_accepted(e));
+        found.stated = Some(vec![of(lag, 3, 0.5), of(delay, 0, 0.2), of(bias, 0, 0.2)]);
+        assert_eq!(named(&found), [false, false, true]);
+        assert!(found.probability(EffectId::SteeringDelay) < 0.5);
+        found.stated = Some(vec![of(lag, 0, 0.5), of(delay, 0, 0.2)]);
+        assert_eq!(named(&found), [true, true, false]);
+        found.stated = Some(vec![of(lag, 3, 0.1), of(delay, 0, 0.2)]);
+        assert_eq!(named(&found), [false, true, false]);
     }
 }

@@ -67,8 +67,8 @@ impl Inferred {
     /// Probability that an effect matters: the chance that it is a cause where it is left in the model or does as well in another's place, that of the
     /// fit where held-out data were not asked.
     pub(crate) fn probability(&self, effect: EffectId) -> f64 {
-        let in_place =
-            self.statement(effect).map_or_else(|| self.probability_instead(effect), Statement::chance);
+        let in_place = self.statement(effect).map(|s| s.chance() * self.ground(effect, s));
+        let in_place = in_place.unwrap_or_else(|| self.probability_instead(effect));
         in_place.max(self.probability_beside(effect))
     }
 
@@ -98,18 +98,30 @@ impl Inferred {
         self.stated.as_ref()?.iter().find(|s| s.term == term)
     }
 
-    /// Takes note that held-out data speak against an effect.
-    pub(crate) fn refute(&mut self, effect: EffectId) {
+    /// Chance that larger effects at an effect's sites are what they are taken for: beside a stand-in for what nobody asked for, a smaller one may be
+    /// the rest of that.
+    fn ground(&self, effect: EffectId, statement: &Statement) -> f64 {
+        let beside = |other: &EffectId| {
+            let sites = effect.spec().sites;
+            *other != effect && other.spec().sites.iter().any(|site| sites.contains(site))
+        };
+        let effects = self.columns.effects.iter().filter(|e| beside(e));
+        let larger = effects.filter_map(|e| self.statement(*e)).filter(|s| s.closes > statement.closes);
+        larger.map(Statement::asked).product()
+    }
+
+    /// Takes note that held-out data do not need an effect.
+    pub(crate) fn set_needless(&mut self, effect: EffectId) {
         let term = self.term_of(effect);
         let stated = self.stated.iter_mut().flatten().filter(|s| Some(s.term) == term);
-        stated.for_each(|s| s.refuted = true);
+        stated.for_each(|s| s.needless = true);
     }
 
     /// Whether the verdict names an effect: it, or another candidate that does nearly the same, is likely a cause, and not small beside what of the
     /// unexplained looks like it.
     pub(crate) fn is_accepted(&self, effect: EffectId) -> bool {
         let holds = |s: &Statement| {
-            s.chance_of_candidates() >= decisions::NAMED
+            s.chance_of_candidates() * self.ground(effect, s) >= decisions::NAMED
                 && s.over_unexplained >= decisions::LEAST_OVER_UNEXPLAINED
         };
         self.statement(effect).is_some_and(holds)
