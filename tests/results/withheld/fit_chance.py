@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The chance that an effect which is left in the model is a cause: fits the coefficients `CHANCE` and `RIVAL_LEAVES` of
+"""The chance that an effect which is left in the model is a cause: fits the coefficients `CHANCE`, `MOST_SURE` and `RIVAL_LEAVES` of
 nodes/lib/diagnosis/src/decisions.rs on development cases whose labels are open, scores every batch by a fit on the others, and writes
 development_effects.csv. Needs NumPy.
 
@@ -52,30 +52,47 @@ def signs(rows):
     return np.column_stack([np.ones(len(rows)), np.log(np.maximum(size, LEAST) / UNIT)])
 
 
+def chances(x, model):
+    most, weights = model
+    return most / (1 + np.exp(-x @ weights))
+
+
+def log_loss(chance, cause):
+    return -np.mean(np.log(np.where(cause > 0, chance, 1 - chance)))
+
+
 def fitted(x, cause):
-    weights = np.zeros(x.shape[1])
-    for _ in range(50):
-        chance = 1 / (1 + np.exp(-x @ weights))
-        curvature = x.T @ (x * (chance * (1 - chance))[:, None]) + RIDGE * np.eye(len(weights))
-        weights = weights + np.linalg.solve(curvature, x.T @ (cause - chance) - RIDGE * weights)
-    return weights
+    """The likeliest coefficients, and the chance of an effect whose size is as sure as can be: another cause, which the library does not have, may look like it."""
+
+    def beneath(most):
+        weights = np.zeros(x.shape[1])
+        for _ in range(100):
+            chance = chances(x, (most, weights))
+            slope = chance * (1 - chance / most)
+            spread = chance * (1 - chance)
+            curvature = x.T @ (x * (slope**2 / spread)[:, None]) + RIDGE * np.eye(len(weights))
+            weights = weights + np.linalg.solve(curvature, x.T @ (slope / spread * (cause - chance)) - RIDGE * weights)
+        return most, weights
+
+    models = [beneath(most) for most in np.arange(0.85, 0.9951, 0.005)]
+    return min(models, key=lambda model: log_loss(chances(x, model), cause))
 
 
 def told(name, chance, cause):
     named = chance >= NAMED
     print(f"{name}: {len(cause)} effects, {int(cause.sum())} causes; named {int((named & (cause > 0)).sum())}, "
-          f"not causes {int((named & (cause == 0)).sum())}; log loss {-np.mean(np.log(np.where(cause > 0, chance, 1 - chance))):.3f}")
+          f"not causes {int((named & (cause == 0)).sum())}; log loss {log_loss(chance, cause):.3f}")
     for low, high in [(0, 0.2), (0.2, 0.5), (0.5, 0.8), (0.8, 0.95), (0.95, 1.01)]:
         inside = (chance >= low) & (chance < high)
         if inside.any():
             print(f"    {low:.2f} to {min(high, 1.0):.2f}: {int(inside.sum())}, of these causes {np.mean(cause[inside]):.2f}")
 
 
-def rival_leaves(rows, weights):
+def rival_leaves(rows, model):
     """The share of an effect that a cause which is not among the candidates and does nearly the same leaves unexplained: the likeliest, and where its 90 %
     interval begins. An effect beside such a rival has its chance, shared with it as `unasked` in decisions.rs says."""
     rows = [row for row in rows if int(row[8]) > 0]
-    alone = 1 / (1 + np.exp(-signs(rows) @ weights))
+    alone = chances(signs(rows), model)
     cause = np.array([float(row[4]) for row in rows])
     size, unexplained, untried = (np.array([float(row[i]) for row in rows]) for i in (6, 7, 8))
     shares = np.arange(0.0, 0.5, 0.005)
@@ -101,11 +118,11 @@ def main():
     batch = np.array([row[0] for row in rows])
     for name in sorted(set(batch)):
         own = batch == name
-        told(f"{name}, by a fit on the others", 1 / (1 + np.exp(-x[own] @ fitted(x[~own], cause[~own]))), cause[own])
-    weights = fitted(x, cause)
-    told("all, by their own fit", 1 / (1 + np.exp(-x @ weights)), cause)
-    rival_leaves(all_rows, weights)
-    print("CHANCE:", ", ".join(f"{w:.2f}" for w in weights))
+        told(f"{name}, by a fit on the others", chances(x[own], fitted(x[~own], cause[~own])), cause[own])
+    model = fitted(x, cause)
+    told("all, by their own fit", chances(x, model), cause)
+    rival_leaves(all_rows, model)
+    print(f"MOST_SURE: {model[0]:.3f}\nCHANCE:", ", ".join(f"{w:.2f}" for w in model[1]))
 
 
 if __name__ == "__main__":

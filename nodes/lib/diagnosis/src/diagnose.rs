@@ -173,14 +173,14 @@ pub(crate) fn explain(
             engine.fit(&named, &values, Some(null.starts.clone()), &windows.training, FINAL_ITERATIONS)
         };
         let steps = Steps::of(&engine, &scorer, &windows, &null, &model);
-        let Some(effect) = steps.needless(&engine, &scorer, &windows, &model) else {
+        let Some(effect) = steps.refuted(&engine, &scorer, &windows, &model) else {
             let candidates = candidates.into_iter().filter(|e| !named.contains(e)).take(CANDIDATES);
             let candidates: Vec<(EffectId, Vec<f64>)> = candidates.map(|e| (e, size(&e))).collect();
             break (model, steps, candidates);
         };
         match &mut differences {
-            Some(differences) => differences.set_needless(effect),
-            None => inferred.set_needless(effect),
+            Some(differences) => differences.refute(effect),
+            None => inferred.refute(effect),
         }
     };
     progress("scoring on held-out data");

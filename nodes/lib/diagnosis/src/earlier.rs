@@ -186,7 +186,7 @@ impl Differences {
     }
 
     /// Takes note that held-out data speak against a change.
-    pub(crate) fn set_needless(&mut self, effect: EffectId) {
+    pub(crate) fn refute(&mut self, effect: EffectId) {
         self.accepted.retain(|e| *e != effect);
     }
 

@@ -442,7 +442,7 @@ mod tests {
         let (named, stands_in) = ([EffectId::SteeringLag], [EffectId::VyBias, EffectId::SteeringLag]);
         found.stated = Some(vec![of(lag, 0, 0.2), of(bias, 3, 0.5)]);
         assert_eq!((&found.accepted()[..], &found.modelled()[..]), (&named[..], &stands_in[..]));
-        found.set_needless(EffectId::VyBias);
+        found.refute(EffectId::VyBias);
         assert_eq!((&found.accepted()[..], &found.modelled()[..]), (&named[..], &named[..]));
         found.stated = Some(vec![of(lag, 3, 0.2)]);
         assert!(found.accepted().is_empty() && found.modelled().is_empty());
@@ -459,7 +459,7 @@ mod tests {
         let named = |found: &Inferred| effects.map(|e| found.is_accepted(e));
         found.stated = Some(vec![of(lag, 3, 0.5), of(delay, 0, 0.2), of(bias, 0, 0.2)]);
         assert_eq!(named(&found), [false, false, true]);
-        assert!(found.probability(EffectId::SteeringDelay) < 0.5);
+        assert!(found.probability(EffectId::SteeringDelay) < decisions::NAMED);
         found.stated = Some(vec![of(lag, 0, 0.5), of(delay, 0, 0.2)]);
         assert_eq!(named(&found), [true, true, false]);
         found.stated = Some(vec![of(lag, 3, 0.1), of(delay, 0, 0.2)]);

@@ -110,11 +110,11 @@ impl Inferred {
         larger.map(Statement::asked).product()
     }
 
-    /// Takes note that held-out data do not need an effect.
-    pub(crate) fn set_needless(&mut self, effect: EffectId) {
+    /// Takes note that held-out data speak against an effect.
+    pub(crate) fn refute(&mut self, effect: EffectId) {
         let term = self.term_of(effect);
         let stated = self.stated.iter_mut().flatten().filter(|s| Some(s.term) == term);
-        stated.for_each(|s| s.needless = true);
+        stated.for_each(|s| s.refuted = true);
     }
 
     /// Whether the verdict names an effect: it, or another candidate that does nearly the same, is likely a cause, and not small beside what of the

@@ -14,8 +14,8 @@
 //!    on open development cases gives, unless it is small beside what looks like it and no effect of the library does. Whatever the verdict,
 //!    [`Diagnosis::sites`] says how likely something is the matter where.
 //! 5. Open-loop rollouts of 1 s on held-out blocks (or another bag): nominal, retuned, with the effects, with flexible terms on top (the
-//!    ceiling), with the residual network of `gripsight_s4` in place of effects, against the noise. What does not surely make these errors
-//!    smaller beside the others is not named. Where nothing is named and much more is left than in drives without any effect, something is missing that no effect does.
+//!    ceiling), with the residual network of `gripsight_s4` in place of effects, against the noise. What surely makes these errors larger beside the others is
+//!    not named. Where nothing is named and much more is left than in drives without any effect, something is missing that no effect does.
 //! 6. Two drives are compared by differences ([`Earlier`], `changes`): every parameter is in both, and only what one has and the other has not
 //!    is a change, whatever either leaves unexplained.
 //!

@@ -137,7 +137,7 @@ impl Around<'_, '_> {
                 closes: 1.0 - now.cost / lacking.cost,
                 held_out_log_ratio: asked.log_ratio(lacking.cost, now.cost),
                 size_over_half_width: f64::NAN,
-                needless: false,
+                refuted: false,
                 over_unexplained: discrepancy.beside(self.columns.effects[term - FIRST], &now.fitted.values),
             })
             .collect();

@@ -18,15 +18,15 @@ pub(crate) struct Statement {
     pub(crate) closes: f64,
     /// What it explains over what of the unnamed looks like it; infinite where nothing unnamed is needed.
     pub(crate) over_unexplained: f64,
-    /// Whether rollouts of held-out data do not surely miss by less with it than without it.
-    pub(crate) needless: bool,
+    /// Whether rollouts of held-out data surely miss by more with it than without it.
+    pub(crate) refuted: bool,
 }
 
 impl Statement {
     /// Chance that the effect, or what does nearly the same, is a cause.
     pub(crate) fn chance_of_alike(&self) -> f64 {
         let by_size = decisions::chance(self.size_over_half_width);
-        if self.needless { by_size.min(decisions::NEEDLESS) } else { by_size }
+        if self.refuted { by_size.min(decisions::NEEDLESS) } else { by_size }
     }
 
     /// Chance that one of the candidates that do nearly the same is a cause: what is not among the candidates has its share.
@@ -82,7 +82,7 @@ mod tests {
                 size_over_half_width,
                 closes,
                 over_unexplained,
-                needless: false,
+                refuted: false,
             };
             (cells[4] == "1", statement)
         };
@@ -114,7 +114,7 @@ mod tests {
             size_over_half_width: 0.7,
             closes: 0.01,
             over_unexplained: 0.1,
-            needless: false,
+            refuted: false,
         };
         assert!(weak.chance() < 0.1, "{}", weak.chance());
         let strong = Statement {
@@ -127,7 +127,7 @@ mod tests {
         for less in [
             Statement { size_over_half_width: 1.0, ..strong.clone() },
             Statement { untried: 1, ..strong.clone() },
-            Statement { needless: true, ..strong.clone() },
+            Statement { refuted: true, ..strong.clone() },
         ] {
             assert!(less.chance() < strong.chance());
         }
@@ -143,7 +143,7 @@ mod tests {
             size_over_half_width: 8.0,
             closes: 0.5,
             over_unexplained: f64::INFINITY,
-            needless: false,
+            refuted: false,
         };
         let beside = Statement { rivals: vec![(4, 1.0), (5, 0.5)], ..alone.clone() };
         let whole = alone.chance();

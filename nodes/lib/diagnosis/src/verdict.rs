@@ -49,9 +49,9 @@ pub(crate) fn decide(budget: &Budget, inferred: &Inferred, library: &[EffectId])
     }
     for effect in inferred.candidates() {
         let Some(statement) = inferred.statement(effect) else { continue };
-        if statement.needless {
+        if statement.refuted {
             reasons.push(format!(
-                "{} does not surely make the errors of rollouts on held-out data smaller: they do not need it",
+                "{} makes the errors of rollouts on held-out data larger: it is no cause",
                 effect.name()
             ));
             continue;

@@ -18,7 +18,7 @@ impl Effect for CogShift {
             stated: |car| Some(car.l_f_m),
             value: |car, shift_m| car.l_f_m - shift_m,
         }),
-        spread: 0.89,
+        spread: 1.00,
         ..spec(
             "cog_shift",
             "l_f -= dl, l_r += dl, static loads follow; v_y is still measured at the nominal point",

@@ -12,7 +12,7 @@ pub(super) struct ComplianceSteer;
 
 impl Effect for ComplianceSteer {
     const SPEC: EffectSpec = EffectSpec {
-        spread: 0.05,
+        spread: 0.08,
         ..spec(
             "compliance_steer",
             "d -= c F_yf/F_zf",

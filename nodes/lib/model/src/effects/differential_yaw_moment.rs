@@ -17,7 +17,7 @@ const OFF_POWER: f64 = 0.5;
 impl Effect for DifferentialYawMoment {
     const SPEC: EffectSpec = EffectSpec {
         needs: COMMAND,
-        spread: 0.22,
+        spread: 0.29,
         ..spec(
             "differential_yaw_moment",
             "M_z = -k m g L tanh(r L/v) under power, half of it off power",

@@ -15,7 +15,7 @@ impl Effect for LateralLoadTransfer {
     const SPEC: EffectSpec = EffectSpec {
         outside: Some(OutsideTerm::LateralLoadTransfer),
         usual: Some(|_, size| 0.27 * size),
-        spread: 0.09,
+        spread: 0.08,
         ..spec(
             "lateral_load_transfer",
             "D (1 - k (a_y/a_max)^2), a_max what the tires give with their loads",

@@ -13,7 +13,7 @@ pub(super) struct TireWear;
 
 impl Effect for TireWear {
     const SPEC: EffectSpec = EffectSpec {
-        spread: 0.09,
+        spread: 0.08,
         ..spec(
             "tire_wear",
             "D (1 - rate t)",

@@ -12,6 +12,7 @@ pub(super) struct VyLeverArm;
 
 impl Effect for VyLeverArm {
     const SPEC: EffectSpec = EffectSpec {
+        spread: 0.01,
         outside: Some(OutsideTerm::VYLeverArm),
         ..spec(
             "v_y_lever_arm",

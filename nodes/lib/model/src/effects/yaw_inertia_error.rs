@@ -21,7 +21,7 @@ impl Effect for YawInertiaError {
         }),
         // It is seldom measured: a tenth.
         usual: Some(|_, size| 0.67 * size),
-        spread: 0.18,
+        spread: 0.22,
         ..spec(
             "yaw_inertia_error",
             "I_z *= ratio",
