@@ -459,7 +459,7 @@ mod tests {
         let named = |found: &Inferred| effects.map(|e| found.is_accepted(e));
         found.stated = Some(vec![of(lag, 3, 0.5), of(delay, 0, 0.2), of(bias, 0, 0.2)]);
         assert_eq!(named(&found), [false, false, true]);
-        assert!(found.probability(EffectId::SteeringDelay) < decisions::NAMED);
+        assert!(found.probability(EffectId::SteeringDelay) < crate::decisions::NAMED);
         found.stated = Some(vec![of(lag, 0, 0.5), of(delay, 0, 0.2)]);
         assert_eq!(named(&found), [true, true, false]);
         found.stated = Some(vec![of(lag, 3, 0.1), of(delay, 0, 0.2)]);

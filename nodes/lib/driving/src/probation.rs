@@ -62,7 +62,7 @@ impl Probation {
         let (taken_s, before, without) = self.taken?;
         if taken_s > began_s + LATE * lap.time_s {
             // Most of it was driven without.
-            self.taken = Some((taken_s, before, without.or(Some(lap))));
+            self.taken = Some((taken_s, before, Some(lap)));
             return None;
         }
         self.taken = None;
@@ -112,6 +112,14 @@ mod tests {
         assert!(!probation.was_given_back(&Named { steering_delay_s: Some(0.1), ..named }));
         assert_eq!(back(0.02, 10.5).0, Some(Named::default()));
         assert_eq!(back(0.05, 5.0).0, None);
+        // What counts is the last lap without: a car that had been held back there may be farther from the line.
+        let mut held_back = Probation::default();
+        for (stamp_s, offset_m) in [(0.0, 0.02), (10.0, 0.02)] {
+            assert_eq!(held_back.pass(stamp_s, offset_m, true, &named), None);
+        }
+        held_back.begin(29.0, Named::default());
+        assert_eq!(held_back.pass(30.0, 0.02, true, &named), None);
+        assert_eq!(held_back.pass(40.0, 0.05, true, &named), None);
         // A slide ends it at once, and only while it has yet to prove itself.
         let mut proven = back(0.02, 10.0).1;
         assert_eq!(proven.slides(&named), None);
