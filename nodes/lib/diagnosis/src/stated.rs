@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Mutex, OnceLock};
 
 use gripsight_estimation::selection::{Term, configuration};
-use gripsight_model::Site;
+use gripsight_model::{EffectId, Site};
 use rayon::prelude::*;
 
 use crate::around::{Around, Refined};
@@ -167,6 +167,12 @@ impl Asked<'_, '_, '_, '_> {
     /// Logarithm of the odds that an effect matters, from what is left without it and with it.
     fn log_odds(&self, simpler: f64, fuller: f64) -> f64 {
         (decisions::PRIOR / (1.0 - decisions::PRIOR)).ln() + self.log_ratio(simpler, fuller)
+    }
+
+    /// The same of an effect of the model, by term, as [`of_an_effect`] weighs it.
+    fn log_odds_of(&self, term: usize, simpler: f64, fuller: f64) -> f64 {
+        let effect = self.around.columns.effects[term - FIRST];
+        of_an_effect(effect, 1.0 - fuller / simpler, self.log_odds(simpler, fuller))
     }
 
     /// A configuration fitted by rollouts; `near`: another one with its fit.
@@ -358,7 +364,7 @@ impl Asked<'_, '_, '_, '_> {
                 .into_par_iter()
                 .filter_map(|i| Some((i, self.lacking(&now, &[i])?)))
                 .collect();
-            let log_odds = |(_, lacking): &(usize, Tried)| self.log_odds(lacking.cost, now.cost);
+            let log_odds = |(i, lacking): &(usize, Tried)| self.log_odds_of(*i, lacking.cost, now.cost);
             let mut simpler = simpler;
             // A look from nearby may end short of what the others can do: those that seem needed least are fitted.
             simpler.sort_by(|a, b| log_odds(a).total_cmp(&log_odds(b)));
@@ -418,6 +424,13 @@ impl Asked<'_, '_, '_, '_> {
     }
 }
 
+/// Logarithm of the odds that an effect of a model matters which closes a share of what is left without it. One whose derivative vanishes where it is absent has no
+/// size that is far from nothing or near: it is needed as free terms are, or not at all.
+fn of_an_effect(effect: EffectId, closes: f64, log_odds: f64) -> f64 {
+    let needless = effect.spec().flat_at_null && closes < decisions::LEAST_CLOSED;
+    if needless { f64::NEG_INFINITY } else { log_odds }
+}
+
 /// Which effects are asked for by a fit, in this order, from the costs that looks at them ended with, in the order of their promise, and the cost without any
 /// of them: the likely ones, the best first, then those whose look went astray.
 fn to_be_fitted(looks: &[(usize, f64)], without: f64, is_likely: impl Fn(f64) -> bool) -> Vec<usize> {
@@ -431,6 +444,14 @@ fn to_be_fitted(looks: &[(usize, f64)], without: f64, is_likely: impl Fn(f64) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_limit_that_hardly_acts_is_not_needed_however_likely_it_looks() {
+        assert_eq!(of_an_effect(EffectId::SteeringRateLimit, 0.004, 30.0), f64::NEG_INFINITY);
+        assert_eq!(of_an_effect(EffectId::SteeringRateLimit, 0.05, 30.0), 30.0);
+        // A small size may be known well.
+        assert_eq!(of_an_effect(EffectId::GyroBias, 0.004, 30.0), 30.0);
+    }
 
     #[test]
     fn likely_effects_are_fitted_the_best_first_then_those_whose_look_ends_above_the_model_without_them() {
