@@ -6,7 +6,7 @@
 LABELS of `gripsight withheld make`, VERDICTS and OTHER of `gripsight withheld diagnose` by the one program and the other. A program from before `track_width_m`
 reads vehicle files without that line only; a batch copied without it keeps its labels. Cases that either has no verdict of are left out, and counted.
 
-In scope: race pace, every effect at twice its detection limit or more (others' plants: all). A foreign plant's own effects are no false names.
+In scope: race pace, every effect at twice its detection limit or more (others' plants: all). A foreign plant's own effects are no false names, and no first ones.
 """
 
 import csv
@@ -84,7 +84,10 @@ def names(row, which):
 
 
 def first(row, which):
-    return bool(names(row, which)) and names(row, which)[0] in row["effects"].split()
+    """Whether the first name is the effect put in; a plant's own effects, which may be larger, do not count."""
+    put_in = row["effects"].split()
+    told = [n for n in names(row, which) if n in put_in or n not in row["contained"].split()]
+    return bool(told) and told[0] in put_in
 
 
 def all_named(row, which):
