@@ -5,6 +5,8 @@ use crate::extended::Named;
 /// Mean distance to the line, and time, over those of the lap before from which a lap is worse.
 const FARTHER: f64 = 1.5;
 const SLOWER: f64 = 1.03;
+/// Growth of that distance, in wheelbases, that is nothing: a car that is steered late may be nearer to its line by luck, as it cuts its corners less.
+const NOTHING_WHEELBASES: f64 = 0.05;
 /// Part of a lap that may have been driven before the model was taken.
 const LATE: f64 = 0.1;
 
@@ -29,8 +31,9 @@ pub struct GivenBack {
 }
 
 /// Watches the laps.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(crate) struct Probation {
+    wheelbase_m: f64,
     began_s: Option<f64>,
     sum_m: f64,
     looks: f64,
@@ -41,6 +44,10 @@ pub(crate) struct Probation {
 }
 
 impl Probation {
+    pub(crate) fn new(wheelbase_m: f64) -> Self {
+        Self { wheelbase_m, began_s: None, sum_m: 0.0, looks: 0.0, last: None, taken: None, given_back: None }
+    }
+
     /// A model takes the place of another one.
     pub(crate) fn begin(&mut self, stamp_s: f64, before: Named) {
         self.taken = Some((stamp_s, before, self.last));
@@ -69,7 +76,8 @@ impl Probation {
         let without = without?;
         // A car that goes faster may be farther from the line.
         let faster = SLOWER * lap.time_s < without.time_s;
-        if faster || lap.mean_m < FARTHER * without.mean_m && lap.time_s < SLOWER * without.time_s {
+        let near = (FARTHER * without.mean_m).max(without.mean_m + NOTHING_WHEELBASES * self.wheelbase_m);
+        if faster || lap.mean_m < near && lap.time_s < SLOWER * without.time_s {
             return None;
         }
         self.given_back = Some(GivenBack { named: *used, without: Some(without), with: Some(lap) });
@@ -98,7 +106,7 @@ mod tests {
         let named = Named { v_y_lever_arm_m: Some(0.1), ..Named::default() };
         // Laps of 10 s: without, with it from shortly after the line on, and the one that is judged.
         let back = |offset_m: f64, lap_s: f64| {
-            let mut probation = Probation::default();
+            let mut probation = Probation::new(0.3);
             assert_eq!(probation.pass(0.0, 0.02, true, &named), None);
             assert_eq!(probation.pass(10.0, 0.02, true, &named), None);
             probation.begin(10.1, Named::default());
@@ -110,10 +118,12 @@ mod tests {
         assert_eq!(before, Some(Named::default()));
         assert!(probation.was_given_back(&Named { v_y_lever_arm_m: Some(0.2), ..Named::default() }));
         assert!(!probation.was_given_back(&Named { steering_delay_s: Some(0.1), ..named }));
+        assert_eq!(back(0.034, 10.0).0, None, "14 mm farther are nothing to a car of 0.3 m");
+        assert_eq!(back(0.036, 10.0).0, Some(Named::default()));
         assert_eq!(back(0.02, 10.5).0, Some(Named::default()));
         assert_eq!(back(0.05, 5.0).0, None);
         // What counts is the last lap without: a car that had been held back there may be farther from the line.
-        let mut held_back = Probation::default();
+        let mut held_back = Probation::new(0.3);
         for (stamp_s, offset_m) in [(0.0, 0.02), (10.0, 0.02)] {
             assert_eq!(held_back.pass(stamp_s, offset_m, true, &named), None);
         }

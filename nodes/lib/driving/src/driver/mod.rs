@@ -102,7 +102,7 @@ impl Driver {
             actuator: start.actuator,
             named: Named::default(),
             memory: Memory::default(),
-            probation: Probation::default(),
+            probation: Probation::new(vehicle.wheelbase_m()),
             vehicle,
             drivetrain,
             track,
