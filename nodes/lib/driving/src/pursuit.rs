@@ -21,8 +21,9 @@ const ROLLS: f64 = 1.4;
 const TRIM_S: f64 = 0.1;
 /// Share of the largest planned acceleration from which the trim does not grow.
 const TRIM_UP_TO: f64 = 0.9;
-/// Time in which wheels that lag are brought where they are wanted. Of 15 to 150 ms it keeps both cars, with a lag of 120 ms that they are told of, nearest to
-/// the line (four development tracks, mu = 0.5 and 0.9): sooner the noise steers, later the wheels swing.
+/// Time in which wheels that lag are brought where they are wanted. Told of a lag of 120 ms (the example `closed_loop`, effects, four development tracks, mu = 0.5
+/// and 0.9) both cars are as fast as with 60 ms and nearer to the line (13 and 41 mm, 18 and 49); with 20 ms and less the noise steers and laps are longer (by
+/// up to 12 %), with 100 ms the wheels swing.
 const LEAD_S: f64 = 0.03;
 
 /// How far pursuit looks ahead: the farther, the more corners are cut.
