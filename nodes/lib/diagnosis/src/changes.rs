@@ -10,6 +10,8 @@
 //!
 //! What two drives of an unchanged car differ by, since the model does not carry over from one stretch of road to another, is in [`Between`].
 
+use std::ops::Range;
+
 use gripsight_estimation::selection::{ColumnPrior, Quadratic, Selection, Term, configuration, select};
 use gripsight_model::{BASE, EffectId, Site, TIRES};
 use nalgebra::{DMatrix, DVector};
@@ -110,7 +112,8 @@ fn wide(selection: &Selection, term: usize) -> Sized {
     (selection.mean[term][wide].clone(), selection.sigma[term][wide].clone())
 }
 
-/// The free terms of a site's difference that close too little of the later drive's error, those that close least first.
+/// Differences that must close a share of the later drive's error to be worth a word, as in a drive by itself: a site's free terms, and each effect whose derivative
+/// vanishes where it is absent, as no size of it is far from nothing or near. Of those that close too little the ones that close least.
 fn needless(
     problem: &Quadratic,
     dispersion: f64,
@@ -118,22 +121,24 @@ fn needless(
     best: &[usize],
     earlier: &Inferred,
     later: &Inferred,
-) -> Option<std::ops::Range<usize>> {
+) -> Option<Range<usize>> {
     let cost = |chosen: &[usize]| {
         let step = configuration(problem, dispersion, terms, chosen)?.step;
         Some(2.0 * problem.gradient.dot(&step) + (&problem.information * &step).dot(&step))
     };
     let whole = cost(best)?;
     let all = later.weighed.cost / later.dispersion;
-    let of = |site: Site| {
-        let of_site = earlier.terms_of_site(site);
-        let differences = of_site.start + earlier.terms.len()..of_site.end + earlier.terms.len();
+    let of = |terms: Range<usize>| {
+        let differences = terms.start + earlier.terms.len()..terms.end + earlier.terms.len();
         let mut without = best.to_vec();
         without[differences.clone()].fill(0);
         let closes = (cost(&without).filter(|_| without != best)? - whole) / all;
         (closes < decisions::LEAST_CLOSED).then_some((differences, closes))
     };
-    let least = Site::ALL.into_iter().filter_map(of).min_by(|a, b| a.1.total_cmp(&b.1));
+    let flat = earlier.columns.effects.iter().filter(|e| e.spec().flat_at_null);
+    let flat = flat.filter_map(|e| earlier.term_of(*e)).map(|t| t..t + 1);
+    let sites = Site::ALL.into_iter().map(|site| earlier.terms_of_site(site));
+    let least = sites.chain(flat).filter_map(of).min_by(|a, b| a.1.total_cmp(&b.1));
     least.map(|(differences, _)| differences)
 }
 

@@ -64,7 +64,7 @@ impl<'a> Request<'a> {
 
     /// The model to start from, if any.
     fn given_model(&self) -> Option<&'a ExtendedModelFile> {
-        self.earlier.map(|earlier| &earlier.diagnosis.extended_model).or(self.model)
+        self.earlier.map(|earlier| &earlier.model).or(self.model)
     }
 
     /// The tires to start from, if any.

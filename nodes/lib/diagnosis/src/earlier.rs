@@ -18,7 +18,7 @@ use crate::outcome::{Diagnosis, RankedEffect};
 use crate::sizes::{Sized, reported};
 use crate::trust::TireTrust;
 use crate::usable::{Usable, usable};
-use crate::{GapError, Request, Verdict};
+use crate::{ExtendedModelFile, GapError, Request, Verdict};
 
 /// Times at most that a later drive is linearised anew, around what has changed.
 const AROUND_CHANGES: usize = 3;
@@ -30,6 +30,8 @@ pub struct Earlier {
     pub diagnosis: Diagnosis,
     pub(crate) inferred: Inferred,
     usable: Usable,
+    /// All that the inference left in its model, stated as a cause or not: what it is not sure of is as much in a later drive.
+    pub(crate) model: ExtendedModelFile,
 }
 
 impl Earlier {
@@ -44,7 +46,8 @@ impl Earlier {
         if diagnosis.verdict == Verdict::NotIdentifiable {
             return Err(GapError::Earlier(diagnosis.reasons.join("; ")));
         }
-        Ok(Self { diagnosis, inferred, usable })
+        let model = inferred.model();
+        Ok(Self { diagnosis, inferred, usable, model })
     }
 
     /// What it was explained with, in words.
@@ -185,9 +188,10 @@ impl Differences {
         self.changes.iter().filter(|c| c.probability >= decisions::LIKELY && effect(c)).cloned().collect()
     }
 
-    /// Takes note that held-out data speak against a change.
+    /// Takes note that held-out data speak against a change: what is listed says so, too.
     pub(crate) fn refute(&mut self, effect: EffectId) {
         self.accepted.retain(|e| *e != effect);
+        spoken_against(&mut self.changes, effect);
     }
 
     /// An effect's parameters in the later drive, with standard deviations of what the earlier drive has and of the differences together.
@@ -212,7 +216,7 @@ impl Differences {
             held_out_log_ratio: f64::NAN,
             over_unexplained: f64::NAN,
             size_over_half_width: f64::NAN,
-            confidence: self.compared.of_effect(&self.earlier, effect),
+            confidence: self.changes.iter().find(|c| c.name == effect.name()).map_or(0.0, |c| c.probability),
             confused_with: Vec::new(),
         };
         self.accepted.iter().copied().chain(self.candidates()).map(of).collect()
@@ -240,11 +244,36 @@ impl Differences {
     }
 }
 
+/// Says of a listed change what held-out data leave of it.
+fn spoken_against(changes: &mut [Change], effect: EffectId) {
+    for change in changes.iter_mut().filter(|c| c.name == effect.name()) {
+        change.probability = change.probability.min(decisions::NEEDLESS);
+    }
+    changes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+}
+
 #[cfg(test)]
 mod tests {
     use gripsight_estimation::selection::ColumnPrior;
 
     use super::*;
+    use crate::outcome::EffectParameter;
+
+    #[test]
+    fn what_held_out_data_speak_against_is_not_listed_as_likely() {
+        let change = |name, probability| Change {
+            site: "steering",
+            name,
+            parameter: None,
+            difference: EffectParameter { value: 0.0, low: 0.0, high: 0.0, unit: "1", before: None },
+            probability,
+        };
+        let mut changes = [change("steering_offset", 0.84), change("tires", 0.6), change("gyro_bias", 0.03)];
+        spoken_against(&mut changes, EffectId::SteeringOffset);
+        spoken_against(&mut changes, EffectId::GyroBias);
+        let left = changes.map(|c| (c.name, c.probability));
+        assert_eq!(left, [("tires", 0.6), ("steering_offset", decisions::NEEDLESS), ("gyro_bias", 0.03)]);
+    }
 
     #[test]
     fn a_term_costs_its_odds_and_what_both_models_have_nothing() {

@@ -449,6 +449,17 @@ mod tests {
     }
 
     #[test]
+    fn the_model_that_a_later_drive_is_compared_with_has_what_is_not_named_too() {
+        let mut found = inferred(0.06, &[]);
+        found.stated.iter_mut().flatten().for_each(|s| s.untried = 3);
+        assert!(found.accepted().is_empty());
+        let model = found.model();
+        assert_eq!(model.effects.keys().collect::<Vec<_>>(), ["steering_lag"]);
+        assert!((model.effects["steering_lag"]["tau_s"] - 0.06).abs() < 0.01, "{model:?}");
+        assert!(EffectId::background().all(|e| model.usual.contains_key(e.name())), "{model:?}");
+    }
+
+    #[test]
     fn beside_a_stand_in_nothing_smaller_at_its_site_is_named() {
         let mut found = inferred(0.06, &[]);
         let effects = [EffectId::SteeringLag, EffectId::SteeringDelay, EffectId::VyBias];

@@ -3,9 +3,10 @@
 use std::ops::Range;
 
 use gripsight_estimation::selection::{Selection, Term};
-use gripsight_model::{EffectId, Site};
-use gripsight_vehicle::OwnTires;
+use gripsight_model::{EffectId, Site, TIRES};
+use gripsight_vehicle::{OWN_TIRE_PARAMETERS, OwnTires};
 
+use crate::ExtendedModelFile;
 use crate::columns::Columns;
 use crate::decisions;
 use crate::infer::FIRST;
@@ -149,6 +150,28 @@ impl Inferred {
         }
         flexible.iter_mut().flat_map(|term| &mut term.priors).for_each(|p| p.sigma[0] *= GONE);
         out
+    }
+
+    /// The effects that are left in the model in the end, and tires and what is usual fitted beside them; without flexible terms.
+    pub(crate) fn model(&self) -> ExtendedModelFile {
+        let values = &self.sizes.values;
+        let mut tires = [0.0; OWN_TIRE_PARAMETERS];
+        tires.copy_from_slice(&values[..TIRES]);
+        let mut file = ExtendedModelFile::of_tires(OwnTires::from_parameters(&tires));
+        for &effect in &self.columns.effects {
+            let (Some(term), Some(range)) = (self.term_of(effect), self.columns.of_effect(effect)) else {
+                continue;
+            };
+            let target = match effect.spec().usual {
+                _ if self.chosen[term] > 0 => &mut file.effects,
+                Some(_) => &mut file.usual,
+                None => continue,
+            };
+            let own =
+                effect.spec().parameters.iter().map(|p| p.name.to_owned()).zip(values[range].iter().copied());
+            target.insert(effect.name().to_owned(), own.collect());
+        }
+        file
     }
 
     /// Parameters of an effect where it matters, and their standard deviations: those of the most probable model, if it has the effect, else of
