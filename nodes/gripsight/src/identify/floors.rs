@@ -54,6 +54,21 @@ pub(super) fn folder(out: &Path, part: usize, parts: usize) -> anyhow::Result<Pa
     Ok(folder)
 }
 
+/// Moves the folders of floors that an earlier run found in `out`, and this one did not: they would read as floors of this drive.
+pub(super) fn set_aside(out: &Path, parts: usize) -> anyhow::Result<()> {
+    for floor in parts.max(1).. {
+        let old = out.join(format!("floor_{floor}"));
+        if !old.exists() {
+            break;
+        }
+        let aside = (1..).map(|k| out.join(format!("floor_{floor}.earlier_{k}"))).find(|path| !path.exists());
+        let aside = aside.context("no name is free for an earlier floor")?;
+        std::fs::rename(&old, &aside).with_context(|| format!("cannot move {}", old.display()))?;
+        tracing::warn!("{} is of another drive: moved to {}", old.display(), aside.display());
+    }
+    Ok(())
+}
+
 /// Which part of a drive it is: `0.0 to 23.4 s`.
 fn span(drive: &StateSequence, part: &StateSequence) -> String {
     let from_s = (part.start_stamp_ns - drive.start_stamp_ns) as f64 / NS_PER_S;
@@ -71,4 +86,29 @@ pub(super) fn line(drive: &StateSequence, part: &StateSequence, outcome: &Outcom
         d.rear.d,
         folder.display()
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_floor_of_an_earlier_run_is_moved_aside_and_kept() {
+        let out = tempfile::tempdir().unwrap();
+        let floor = |name: &str| out.path().join(name).join("pacejka.yaml");
+        for name in ["floor_1", "floor_2", "floor_2.earlier_1", "floor_3", "floor_5"] {
+            std::fs::create_dir(out.path().join(name)).unwrap();
+            std::fs::write(floor(name), name).unwrap();
+        }
+        // Two floors now: the first one's folder is written anew, the last one's files go to `out` itself.
+        set_aside(out.path(), 2).unwrap();
+        let held = |name: &str| std::fs::read_to_string(floor(name)).ok();
+        assert_eq!(held("floor_1").as_deref(), Some("floor_1"));
+        assert_eq!([held("floor_2"), held("floor_3")], [None, None]);
+        assert_eq!(held("floor_2.earlier_1").as_deref(), Some("floor_2.earlier_1"));
+        assert_eq!(held("floor_2.earlier_2").as_deref(), Some("floor_2"));
+        assert_eq!(held("floor_3.earlier_1").as_deref(), Some("floor_3"));
+        // No run leaves a gap.
+        assert_eq!(held("floor_5").as_deref(), Some("floor_5"));
+    }
 }

@@ -10,6 +10,7 @@ mod truth;
 mod windows;
 
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -48,7 +49,7 @@ use windows::Windows;
 /// of odometry with --window; windows.csv then holds every window, and when a change of the grip was noticed.
 ///
 /// Where the grip changes within a drive, each floor is identified by itself: the files describe the last one, which the car is on now; those before it are in
-/// DIR/floor_1 and on, and windows.csv holds a line each.
+/// DIR/floor_1 and on, and windows.csv holds a line each. A floor_N that an earlier run left, and this one has not, is moved to floor_N.earlier_1.
 ///
 /// Several bags of one car give more slip and tighter intervals; where one of them alone says something else than all together, that is said.
 #[derive(Debug, Args)]
@@ -283,6 +284,7 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
         timing.add(&stages.finish());
         windows.add_changes(&found.changes);
         let parts = found.parts.len();
+        floors::set_aside(&args.out, parts)?;
         for (k, OnOneFloor { sequence, mut outcome }) in found.parts.into_iter().enumerate() {
             together::compare(args, &alone, &vehicle, &mut outcome)?;
             let writing = Instant::now();
@@ -312,6 +314,8 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
     timing.posterior_s = timing.total_s - before;
     if windows.len() > 1 {
         files.push(windows.write(&args.out)?);
+    } else {
+        remove_old(&args.out.join(windows::FILE))?;
     }
     let timing_file = args.out.join("timing.json");
     fs::write(&timing_file, serde_json::to_string_pretty(&timing)? + "\n")
@@ -319,6 +323,16 @@ pub(crate) fn run(args: &IdentifyArgs) -> anyhow::Result<Outcome> {
     print!("{}", windows.notices());
     print!("{}", summary::summary(&car_name(args, &vehicle), &result, &notes, &files, &timing));
     Ok(if result.accepted { Outcome::Done } else { Outcome::NotAccepted })
+}
+
+/// Removes what an earlier run left, where this one has nothing to put in its place.
+fn remove_old(path: &Path) -> anyhow::Result<()> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != ErrorKind::NotFound => {
+            Err(error).with_context(|| format!("cannot remove the old {}", path.display()))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The car's name: the vehicle file's, else the bag's.

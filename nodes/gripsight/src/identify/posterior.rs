@@ -1,7 +1,6 @@
 //! posterior.json: the car's own tires, for a diagnosis to start from.
 
 use std::fs;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -34,12 +33,8 @@ pub(super) fn write(
         }
         Err(error) => {
             tracing::warn!("no {FILE}: {error}");
-            match fs::remove_file(&path) {
-                Err(e) if e.kind() != ErrorKind::NotFound => {
-                    Err(e).with_context(|| format!("cannot remove the old {}", path.display()))
-                }
-                _ => Ok(None),
-            }
+            super::remove_old(&path)?;
+            Ok(None)
         }
     }
 }

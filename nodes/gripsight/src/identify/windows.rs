@@ -7,6 +7,9 @@ use anyhow::Context;
 use gripsight_identification::{AcceptedSet, GripChange, Outcome, Reading};
 use gripsight_signals::{NS_PER_S, StateSequence};
 
+/// Name of the file.
+pub(super) const FILE: &str = "windows.csv";
+
 /// The windows of a run, in their order.
 #[derive(Debug, Default)]
 pub(super) struct Windows {
@@ -79,11 +82,11 @@ impl Windows {
         &self.notices
     }
 
-    /// Writes `windows.csv`.
+    /// Writes [`FILE`].
     pub(super) fn write(&self, folder: &Path) -> anyhow::Result<PathBuf> {
         const HEADER: &str = "from_s,to_s,status,d_set_front,d_set_rear,k_front_n_per_rad,k_rear_n_per_rad,d_front,d_rear,reached_front,reached_rear,\
             error_ratio,d_front_now,d_rear_now,changed\n";
-        let path = folder.join("windows.csv");
+        let path = folder.join(FILE);
         std::fs::write(&path, HEADER.to_owned() + &self.lines)
             .with_context(|| format!("cannot write {}", path.display()))?;
         Ok(path)
