@@ -18,7 +18,7 @@ mod prior;
 mod signals;
 mod weights;
 
-use gripsight_model::Window;
+use gripsight_model::{Rollout, Window};
 use gripsight_vehicle::{GRAVITY_MPS2, MagicFormula, PacejkaParameters, SingleTrack, VehicleParameters};
 use nalgebra::DMatrix;
 
@@ -160,7 +160,7 @@ pub(crate) fn direct(
         let width = parameter.high - parameter.low;
         (parameter.low, parameter.high) = (parameter.low - width, parameter.high + width);
     }
-    let errors = fitter.solve(&open, &fitter.training, &weights.sigma, 0);
+    let errors = fitter.solve(&open, (&fitter.training, None), &weights.sigma, (0, TOLERANCE));
     let covariance = errors::covariance(&errors, &open, &data.doubt);
     let grip_change = change_within(&fitter.model, data, &found.parameters, &weights.sigma);
     let allowed = nuisance_of(&found.parameters);
@@ -237,9 +237,17 @@ const SEARCH_WINDOWS: usize = 60;
 /// Normalised stiffness that fits start from.
 const FIRST_STIFFNESS: f64 = 8.0;
 
+/// The search ends where a step lowers the cost by less than this share: what is searched for differs by [`WORTH`].
+const SEARCH_TOLERANCE: f64 = 1e-4;
+
 /// Windows of a drive, evenly over it, of which there are not too many to search with.
 fn thinned(windows: &[Window]) -> Vec<Window> {
-    windows.iter().copied().step_by(windows.len().div_ceil(SEARCH_WINDOWS).max(1)).collect()
+    windows.iter().copied().step_by(thinning(windows)).collect()
+}
+
+/// Which of them: every so many.
+fn thinning(windows: &[Window]) -> usize {
+    windows.len().div_ceil(SEARCH_WINDOWS).max(1)
 }
 
 struct Fitter<'a> {
@@ -249,17 +257,24 @@ struct Fitter<'a> {
 }
 
 impl Fitter<'_> {
-    fn solve(&self, all: &[Parameter], windows: &[Window], sigma: &[f64; 2], iterations: usize) -> Fit {
+    /// From start states that an earlier fit found of the same windows, where there are such.
+    fn solve(
+        &self,
+        all: &[Parameter],
+        (windows, starts): (&[Window], Option<Vec<[f64; 2]>>),
+        sigma: &[f64; 2],
+        (iterations, tolerance): (usize, f64),
+    ) -> Fit {
         let problem = Problem {
             model: &self.model,
             windows,
             sigma,
             parameters: all,
             robust_k: ROBUST_K,
-            tolerance: TOLERANCE,
+            tolerance,
             max_iterations: iterations,
         };
-        fit(&problem, None)
+        fit(&problem, starts)
     }
 
     /// Delay, offsets and stiffnesses on the windows of low lateral acceleration, from several delays; the shape of the tire curves, gain and lever
@@ -279,7 +294,7 @@ impl Fitter<'_> {
         let scan = delays_s.iter().map(|&delay_s| {
             let mut all = all.clone();
             all[SIGNALS].start = delay_s;
-            self.solve(&all, &low, &sigma, 8)
+            self.solve(&all, (&low, None), &sigma, (8, SEARCH_TOLERANCE))
         });
         let best = scan
             .min_by(|a, b| a.linearization.cost.total_cmp(&b.linearization.cost))
@@ -301,24 +316,27 @@ impl Fitter<'_> {
             all[j].free = false;
         }
         let few = thinned(&self.training);
-        let mut found = self.solve(&all, &few, &weights.sigma, 15);
+        let search = |all: &[Parameter], starts, weights: &Weights| {
+            self.solve(all, (&few, starts), &weights.sigma, (15, SEARCH_TOLERANCE))
+        };
+        let mut found = search(&all, None, &weights);
         let mut weights = self::weights(&self.model, &found, &few, &self.data.noise);
         restart(&mut all, &found.parameters);
-        found = self.solve(&all, &few, &weights.sigma, 15);
+        found = search(&all, Some(found.starts), &weights);
         // A lever arm that was taken for stiffness may have driven the tires to where no step leads back: start on either side, too.
         let mut freed = all.clone();
         restart(&mut freed, &found.parameters);
         for j in [GAIN, LEVER] {
             freed[j].free = true;
         }
-        let mut best = self.solve(&freed, &few, &weights.sigma, 15);
+        let mut best = search(&freed, Some(found.starts.clone()), &weights);
         for share in [-LEVER_START, LEVER_START] {
             for axle in [0, 4] {
                 (freed[axle].start, freed[axle + 1].start) = (FIRST_STIFFNESS, C_PRIOR.mean);
                 freed[axle + 3].start = E_PRIOR.mean;
             }
             freed[LEVER].start = share * self.model.vehicle.wheelbase_m();
-            let other = self.solve(&freed, &few, &weights.sigma, 15);
+            let other = search(&freed, Some(found.starts.clone()), &weights);
             if other.linearization.cost < best.linearization.cost {
                 best = other;
             }
@@ -329,10 +347,15 @@ impl Fitter<'_> {
         } else {
             shift = std::array::from_fn(|j| best.parameters[j] - found.parameters[j]);
         }
+        let mut starts: Vec<[f64; 2]> = self.training.iter().map(|w| self.model.start_guess(w)).collect();
+        for (start, known) in starts.iter_mut().step_by(thinning(&self.training)).zip(&found.starts) {
+            *start = *known;
+        }
         for fitted in [&few, &self.training] {
             weights = self::weights(&self.model, &found, fitted, &self.data.noise);
             restart(&mut all, &found.parameters);
-            found = self.solve(&all, &self.training, &weights.sigma, 15);
+            found = self.solve(&all, (&self.training, Some(starts)), &weights.sigma, (15, TOLERANCE));
+            starts = found.starts.clone();
         }
         (all, found, weights, shift)
     }
@@ -351,7 +374,10 @@ impl Fitter<'_> {
             return Ok(None);
         }
         let better = |starts: [Vec<Parameter>; 2]| {
-            let [held, likely] = starts.map(|all| self.solve(&all, &self.training, &weights.sigma, 30));
+            let [held, likely] = starts.map(|all| {
+                let begin = (&self.training[..], Some(found.starts.clone()));
+                self.solve(&all, begin, &weights.sigma, (30, TOLERANCE))
+            });
             if likely.linearization.cost < held.linearization.cost { likely } else { held }
         };
         let with_it = better(with_prior(all, found, peak, prior));

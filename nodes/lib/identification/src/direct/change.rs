@@ -6,12 +6,12 @@
 
 use std::fmt;
 
-use gripsight_estimation::shooting::{Fit, Parameter, Problem, TOLERANCE, fit};
+use gripsight_estimation::shooting::{Descent, Fit, Parameter, Problem, TOLERANCE, descend, fit};
 use gripsight_model::Window;
 use gripsight_vehicle::GRAVITY_MPS2;
 use serde::Serialize;
 
-use super::{ROBUST_K, SEARCH_WINDOWS, SPREAD, thinned};
+use super::{ROBUST_K, SEARCH_TOLERANCE, SPREAD, thinned, thinning};
 use crate::data::{Data, quantile};
 use crate::rollout::TireRollout;
 use crate::tires::D_BOUNDS;
@@ -65,41 +65,39 @@ pub(super) fn change_within(
     sigma: &[f64; 2],
 ) -> Option<GripChange> {
     let windows: Vec<Window> = data.windows.iter().map(|(w, _)| *w).collect();
-    let run = |at: &[f64], windows: &[Window], peaks_free: bool| {
-        let parameter = |(j, &start): (usize, &f64)| {
-            let free = peaks_free && D.contains(&j);
-            let (low, high) = if free { D_BOUNDS } else { (f64::NEG_INFINITY, f64::INFINITY) };
-            Parameter { start, low, high, free, prior: None }
-        };
-        let all: Vec<Parameter> = at.iter().enumerate().map(parameter).collect();
-        let (robust_k, tolerance, max_iterations) = (ROBUST_K, TOLERANCE, 15);
-        let problem =
-            Problem { model, windows, sigma, parameters: &all, robust_k, tolerance, max_iterations };
-        fit(&problem, None)
-    };
-    let solve = |windows: &[Window]| run(parameters, windows, true);
+    let on = OnOneFloor { model, sigma };
+    // D moves where the windows begin only a little: each fit begins where they do with one D.
+    let starts = on.searched(&windows, parameters, None, false).starts;
     // A long drive's coarse place shows in some of its windows.
-    let every = windows.len().div_ceil(SEARCH_WINDOWS).max(1);
+    let every = thinning(&windows);
     let few = thinned(&windows);
-    let costs = |at: &[f64]| run(at, &windows, false).linearization.window_costs;
-    let sides = |windows: &[Window], place: usize| (solve(&windows[..place]), solve(&windows[place..]));
+    let few_starts: Vec<[f64; 2]> = starts.iter().copied().step_by(every).collect();
+    let cost = |windows: &[Window], starts: &[[f64; 2]]| {
+        on.searched(windows, parameters, Some(starts.to_vec()), true).at.cost
+    };
+    let sides = |place: usize| {
+        let fitted = |windows, starts: &[[f64; 2]]| on.fitted(windows, parameters, starts.to_vec());
+        (fitted(&windows[..place], &starts[..place]), fitted(&windows[place..], &starts[place..]))
+    };
+    let costs =
+        |side: &Fit| on.searched(&windows, &side.parameters, Some(starts.clone()), false).at.window_costs;
     let last = windows.len().checked_sub(LEAST_WINDOWS)?;
     let places = (1..PARTS).map(|k| k * windows.len() / PARTS).filter(|k| (LEAST_WINDOWS..=last).contains(k));
-    let cost = |(_, (a, b)): &(usize, (Fit, Fit))| a.linearization.cost + b.linearization.cost;
-    let coarse = places.map(|place| (place, sides(&few, place.div_ceil(every))));
-    let first = coarse.min_by(|a, b| cost(a).total_cmp(&cost(b)))?;
+    let coarse = places.map(|place| {
+        let (before, after) = few.split_at(place.div_ceil(every));
+        let (starts_before, starts_after) = few_starts.split_at(before.len());
+        (place, cost(before, starts_before) + cost(after, starts_after))
+    });
     // The coarse place mixes both floors on one side: from there to where each window fits better with the other side's D.
-    let (mut place, (mut before, mut after)) = first;
-    if every > 1 {
-        (before, after) = sides(&windows, place);
-    }
+    let (mut place, _) = coarse.min_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    let (mut before, mut after) = sides(place);
     for _ in 0..REFINED {
-        let better = between(&costs(&before.parameters), &costs(&after.parameters), last)?;
+        let better = between(&costs(&before), &costs(&after), last)?;
         if better == place {
             break;
         }
         place = better;
-        (before, after) = sides(&windows, place);
+        (before, after) = sides(place);
     }
     // As a share of the smaller D; a D on its bound is not known.
     let share = |j: usize| {
@@ -137,6 +135,53 @@ pub(super) fn change_within(
         before: peaks(&before),
         after: peaks(&after),
     })
+}
+
+/// Fits of D of both axles, everything else held.
+struct OnOneFloor<'a> {
+    model: &'a TireRollout<'a>,
+    sigma: &'a [f64; 2],
+}
+
+impl OnOneFloor<'_> {
+    fn with<R>(
+        &self,
+        windows: &[Window],
+        at: &[f64],
+        (peaks_free, tolerance): (bool, f64),
+        solved: impl FnOnce(&Problem<'_, TireRollout<'_>>) -> R,
+    ) -> R {
+        let parameter = |(j, &start): (usize, &f64)| {
+            let free = peaks_free && D.contains(&j);
+            let (low, high) = if free { D_BOUNDS } else { (f64::NEG_INFINITY, f64::INFINITY) };
+            Parameter { start, low, high, free, prior: None }
+        };
+        let parameters: Vec<Parameter> = at.iter().enumerate().map(parameter).collect();
+        solved(&Problem {
+            model: self.model,
+            windows,
+            sigma: self.sigma,
+            parameters: &parameters,
+            robust_k: ROBUST_K,
+            tolerance,
+            max_iterations: 15,
+        })
+    }
+
+    fn fitted(&self, windows: &[Window], at: &[f64], starts: Vec<[f64; 2]>) -> Fit {
+        self.with(windows, at, (true, TOLERANCE), |problem| fit(problem, Some(starts)))
+    }
+
+    /// Costs to compare, of the start states alone or of both peaks, too.
+    fn searched(
+        &self,
+        windows: &[Window],
+        at: &[f64],
+        starts: Option<Vec<[f64; 2]>>,
+        peaks_free: bool,
+    ) -> Descent {
+        self.with(windows, at, (peaks_free, SEARCH_TOLERANCE), |problem| descend(problem, starts))
+    }
 }
 
 /// Lateral acceleration that the car turned with in some windows, over gravity: in a turn the force over the load of either axle.
