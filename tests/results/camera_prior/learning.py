@@ -6,8 +6,9 @@
 Every floor is driven by the reference car with pictures of it (`gripsight simulate --camera`), identified (`identify`, without a network in the loop:
 the prior is what is looked at), taught (`friction calibrate --results`, all drives so far), and read before the next drive (`friction`), with
 what was taught and without. At last one track of all floors: what their first drives taught together, read on the last drives; and what the
-others taught, on a floor that was left out. The truth is the peak force over the load of the car's axles in a slow steering ramp on that floor. OUT keeps
-bags and results and is gone on with; learning.csv beside this file receives a row a drive.
+others taught, on a floor that was left out. Then the paper's loop runs on the last drive of each floor from three starts: none (mu0), what the network
+reads, and what the drives before taught. The truth is the peak force over the load of the car's axles in a slow steering ramp on that floor. OUT keeps
+bags and results and is gone on with; learning.csv beside this file receives a row a drive, turns.csv a row a run of the loop.
 """
 
 import argparse
@@ -29,6 +30,8 @@ FLOORS = [
     ("snow that looks like wet asphalt", 0.30, 0.60, 9106, "esses", 1.10),
 ]
 SECONDS = 25
+# What the paper's loop starts from where nothing is known.
+MU0 = 0.51
 
 
 class Floor:
@@ -104,6 +107,22 @@ class Floor:
         said = self.read(bag, "--calibration", file)
         return [self.name, name, self.mu, self.looks, self.truth(), *self.read(bag)[:2], *said, "", "", ""]
 
+    def turns(self):
+        """The paper's loop on the last drive: turns taken, and what they end at, from each start."""
+        file = self.folder / "before_last.json"
+        self.run("friction", "calibrate", *self.lessons, "--out", file)
+        bag = max(self.folder.glob("drive*.mcap"))
+        starts = {"mu0": None, "network": self.read(bag)[:2], "taught": self.read(bag, "--calibration", file)[:2]}
+        for name, start in starts.items():
+            out = self.folder / f"turns_{name}"
+            if not (out / "timing.json").exists():
+                prior = ["--prior-mu", start[0], "--prior-sigma", start[1]] if start else []
+                vehicle = bag.with_suffix(".vehicle.yaml")
+                self.run("identify", bag, "--vehicle", vehicle, "--method", "paper", *prior, "--out", out, may=(0, 3))
+            found = json.loads((out / "identification.json").read_text())
+            d = [found["found"][axle]["d"] for axle in ("front", "rear")]
+            yield [self.name, name, start[0] if start else MU0, self.truth(), found["iterations"], found["converged"], *d]
+
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -131,6 +150,14 @@ def main():
         for floor in floors:
             others = [f for f in floors if f is not floor]
             say(floor.last("other floors", others, args.out / "others.json"))
+    with Path(__file__).with_name("turns.csv").open("w", newline="") as file:
+        rows = csv.writer(file, lineterminator="\n")
+        rows.writerow(["floor", "start", "mu_hat", "D", "turns", "converged", "D front", "D rear"])
+        for floor in floors:
+            for row in floor.turns():
+                rows.writerow([f"{x:.4f}" if isinstance(x, float) else x for x in row])
+                file.flush()
+                print(*row)
 
 
 if __name__ == "__main__":
