@@ -5,7 +5,9 @@
 PICTURES holds the folders of the table (file, state by eye, start of the SHA-256): google_bing_yahoo_flickr/250x250 of
 github.com/kagan94/road_image_datasets. Development was done on real_roads.csv; the pictures of real_roads_fresh.csv were labelled before, and
 read once. They are web pictures without a licence: read here, trained on nowhere, not part of this project. Each is of
-another place, camera and season, which is harder than one track. A draw takes N pictures of each state at random (its seed), learns from them with
+another place, camera and season, which is harder than one track. real_roads_other.csv is another collector's: image of
+github.com/611711Dark/RoadSurfaceRecognition_CNN_with_Dataset, no licence stated either: frames of one car's camera on dry roads (they are of
+the RTK set), and web pictures of gravel, mud and snow; labelled before, and read once. A draw takes N pictures of each state at random (its seed), learns from them with
 `gripsight friction calibrate`, and reads all others with `gripsight friction --calibration`.
 """
 
@@ -20,7 +22,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-FRICTION = {"dry": 0.85, "wet": 0.60, "snow": 0.25}
+# Of gravel and mud nobody measured what these have: the middle of what accident reconstruction takes for loose gravel and dry earth, and for mud.
+FRICTION = {"dry": 0.85, "wet": 0.60, "snow": 0.25, "gravel": 0.60, "mud": 0.40}
 
 
 def readings(gripsight, files, more=()):
@@ -30,7 +33,7 @@ def readings(gripsight, files, more=()):
 
 def score(name, draw, states, read):
     """Root mean square error and the rest, each state counted alike, over the pictures that are not refused."""
-    errors = {state: [] for state in FRICTION}
+    errors = {state: [] for state in states}
     confident = within = usable = 0
     for state, reading in zip(states, read, strict=True):
         if not reading["valid"]:
@@ -40,7 +43,8 @@ def score(name, draw, states, read):
         errors[state].append(error * error)
         within += abs(error) < reading["sigma"]
         confident += abs(error) > 0.3 and reading["sigma"] < 0.15
-    rmse = math.sqrt(sum(sum(e) / len(e) for e in errors.values()) / len(errors))
+    squares = [sum(e) / len(e) for e in errors.values() if e]
+    rmse = math.sqrt(sum(squares) / len(squares))
     return [name, draw, len(read), usable, f"{rmse:.4f}", f"{confident / usable:.4f}", f"{within / usable:.4f}"]
 
 
@@ -62,17 +66,18 @@ def main():
     out.writerow(["read by", "draw", "pictures", "usable", "balanced rmse", "confidently wrong", "within sigma"])
     files = [args.pictures / row["file"] for row in rows]
     states = [row["state"] for row in rows]
-    middle = sum(FRICTION.values()) / len(FRICTION)
+    friction = {state: mu for state, mu in FRICTION.items() if state in states}
+    middle = sum(friction.values()) / len(friction)
     constant = [{"valid": True, "mu_hat": middle, "sigma": 0.25}] * len(rows)
     out.writerow(score("constant", 0, states, constant))
     out.writerow(score("network", 0, states, readings(args.bin, files)))
     for count in args.counts:
         for draw in range(args.draws):
             rng = random.Random(1000 * count + draw)
-            taken = {i for s in FRICTION for i in rng.sample([i for i, x in enumerate(states) if x == s], count)}
+            taken = {i for s in friction for i in rng.sample([i for i, x in enumerate(states) if x == s], count)}
             with tempfile.TemporaryDirectory() as folder:
                 labels = []
-                for state, mu in FRICTION.items():
+                for state, mu in friction.items():
                     own = Path(folder) / state
                     own.mkdir()
                     labels += ["--label", f"{state}={own}:{mu}"]
