@@ -55,7 +55,7 @@ impl Earlier {
         let named: Vec<&str> = self.diagnosis.effects.iter().filter(|e| e.accepted).map(|e| e.name).collect();
         let of = if named.is_empty() { "tires alone".to_owned() } else { named.join(", ") };
         format!(
-            "the drive before is explained by {of}; what either drive leaves is in both, and only differences count"
+            "the drive before is explained by {of}; a change is asked for beside all that its model has, named or not, and only differences count"
         )
     }
 

@@ -47,11 +47,16 @@ impl ExtendedModelFile {
         for &effect in &state.effects {
             let Some(own) = state.of(effect) else { continue };
             let background = engine.usual(effect).is_some() && !state.named.contains(&effect);
-            let target = if background { &mut file.usual } else { &mut file.effects };
-            let values = effect.spec().parameters.iter().zip(own).map(|(p, v)| (p.name.to_owned(), *v));
-            target.insert(effect.name().to_owned(), values.collect());
+            file.insert(effect, own, background);
         }
         file
+    }
+
+    /// Adds an effect with its parameters, in the order of the fit: a claim, or background.
+    pub(crate) fn insert(&mut self, effect: EffectId, own: &[f64], background: bool) {
+        let target = if background { &mut self.usual } else { &mut self.effects };
+        let values = effect.spec().parameters.iter().zip(own).map(|(p, v)| (p.name.to_owned(), *v));
+        target.insert(effect.name().to_owned(), values.collect());
     }
 
     /// As YAML.

@@ -162,14 +162,10 @@ impl Inferred {
             let (Some(term), Some(range)) = (self.term_of(effect), self.columns.of_effect(effect)) else {
                 continue;
             };
-            let target = match effect.spec().usual {
-                _ if self.chosen[term] > 0 => &mut file.effects,
-                Some(_) => &mut file.usual,
-                None => continue,
-            };
-            let own =
-                effect.spec().parameters.iter().map(|p| p.name.to_owned()).zip(values[range].iter().copied());
-            target.insert(effect.name().to_owned(), own.collect());
+            let chosen = self.chosen[term] > 0;
+            if chosen || effect.spec().usual.is_some() {
+                file.insert(effect, &values[range], !chosen);
+            }
         }
         file
     }
