@@ -70,7 +70,11 @@ def main():
     middle = sum(friction.values()) / len(friction)
     constant = [{"valid": True, "mu_hat": middle, "sigma": 0.25}] * len(rows)
     out.writerow(score("constant", 0, states, constant))
-    out.writerow(score("network", 0, states, readings(args.bin, files)))
+    read = readings(args.bin, files)
+    out.writerow(score("network", 0, states, read))
+    for state in friction:
+        own = [reading for reading, x in zip(read, states, strict=True) if x == state]
+        out.writerow(score(f"network: {state}", 0, [state] * len(own), own))
     for count in args.counts:
         for draw in range(args.draws):
             rng = random.Random(1000 * count + draw)
