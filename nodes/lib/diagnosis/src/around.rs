@@ -237,7 +237,7 @@ impl Around<'_, '_> {
                     .map(|(p, &c)| if p.free { begin.values[c].clamp(p.low, p.high) } else { p.start })
                     .collect();
                 let problem = engine.problem(&model, &windows.windows, &parameters, 0);
-                let cost = shooting::evaluate(&problem, &at, &begin.starts).cost;
+                let cost = shooting::cost(&problem, &at, &begin.starts);
                 ((stuck, cost), (at, begin.starts))
             })
             .min_by(|a, b| a.0.0.cmp(&b.0.0).then(a.0.1.total_cmp(&b.0.1)))?;
@@ -247,11 +247,11 @@ impl Around<'_, '_> {
             tolerance: SETTLED * dispersion / cost,
             ..engine.problem(&model, &windows.windows, &parameters, iterations)
         };
-        let best = shooting::descend(&problem, Some(begin));
+        let best = shooting::fit(&problem, Some(begin));
         for (&column, &v) in map.iter().zip(&best.parameters) {
             target[column] = v;
         }
-        let cost = best.at.cost;
+        let cost = best.linearization.cost;
         cost.is_finite().then_some((cost, Refined { values: target, starts: best.starts }))
     }
 

@@ -215,13 +215,13 @@ impl<'a> Engine<'a> {
         let model = self.model(&effects, None);
         let parameters = self.parameters(named, &effects, values, 1.0);
         let problem = self.problem(&model, &windows.windows, &parameters, max_iterations);
-        let end = shooting::descend(&problem, starts);
+        let end = shooting::fit(&problem, starts);
         State {
             named: named.to_vec(),
             effects,
             parameters: end.parameters,
             starts: end.starts,
-            cost: end.at.cost,
+            cost: end.linearization.cost,
             finite: end.stop != StopReason::NotFinite,
         }
     }
@@ -236,7 +236,7 @@ impl<'a> Engine<'a> {
         let own = state.parameters.len();
         parameters[..own].iter_mut().for_each(|p| p.free = false);
         let problem = self.problem(&model, &windows.windows, &parameters, STEPS);
-        shooting::descend(&problem, Some(state.starts.clone())).parameters
+        shooting::fit(&problem, Some(state.starts.clone())).parameters
     }
 
     /// Best starts for fixed parameters, and the plain sum of squares of each window in units of the noise.
@@ -271,7 +271,7 @@ impl<'a> Engine<'a> {
             tolerance: TOLERANCE,
             max_iterations: 6,
         };
-        let end = shooting::descend(&problem, None);
-        Score { squares: end.at.window_costs, starts: end.starts }
+        let end = shooting::fit(&problem, None);
+        Score { squares: end.linearization.window_costs, starts: end.starts }
     }
 }

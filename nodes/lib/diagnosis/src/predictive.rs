@@ -65,9 +65,9 @@ impl Around<'_, '_> {
         let from = starts.get().cloned();
         let iterations = if from.is_some() { START_ITERATIONS_NEARBY } else { START_ITERATIONS };
         let problem = self.engine.problem(&model, &scorer.windows.windows, &parameters, iterations);
-        let end = shooting::descend(&problem, from);
+        let end = shooting::fit(&problem, from);
         starts.get_or_init(|| end.starts);
-        end.at.cost
+        end.linearization.cost
     }
 
     /// The columns of a configuration's model, in the model's order. What has come to its bound stays there.
@@ -127,7 +127,7 @@ impl Around<'_, '_> {
             let starts = at.starts_after(&DVector::from_iterator(step.len(), taken), &fitted.starts);
             let windows = &self.windows.windows[block.windows.clone()];
             let problem = self.engine.problem(&model, windows, &parameters, 0);
-            Some(shooting::evaluate(&problem, &values, &starts[block.windows.clone()]).cost)
+            Some(shooting::cost(&problem, &values, &starts[block.windows.clone()]))
         };
         blocks.iter().map(without).sum()
     }

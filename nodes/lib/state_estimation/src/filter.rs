@@ -228,8 +228,7 @@ impl Filter {
         }
         let gain = ph / variance;
         self.s += gain * innovation;
-        self.p -= gain * ph.transpose();
-        self.p = (self.p + self.p.transpose()) * 0.5;
+        self.p.ger(-1.0, &gain, &ph, 1.0);
         tell(Update::One { h: *h, gain, innovation, variance });
     }
 
@@ -275,7 +274,6 @@ impl Filter {
         let gain = columns * inverse;
         self.s += gain * innovation;
         self.p -= gain * columns.transpose();
-        self.p = (self.p + self.p.transpose()) * 0.5;
         tell(Update::Pose(Box::new(PoseUpdate { h, gain, innovation, inverse })));
     }
 

@@ -197,7 +197,8 @@ fn before(update: &Update, adjoint: &mut Vector, information: &mut Matrix) {
             let told = *information * gain;
             *adjoint -= h * (gain.dot(adjoint) + innovation / variance);
             let own = h * (gain.dot(&told) + 1.0 / variance) - told;
-            *information += own * h.transpose() - h * told.transpose();
+            information.ger(1.0, &own, h, 1.0);
+            information.ger(-1.0, h, &told, 1.0);
         }
         Update::Pose(pose) => {
             let told = *information * pose.gain;

@@ -4,6 +4,8 @@
 //!
 //! D is dimensionless: the paper seeds it with the friction prior mu_hat. No load sensitivity, shifts, camber or combined slip.
 
+use std::f64::consts::FRAC_PI_2;
+
 use serde::{Deserialize, Serialize};
 
 use crate::Real;
@@ -61,22 +63,30 @@ impl MagicFormula {
         Self { b: normalized_stiffness_1prad / (c * d), c, d, e }
     }
 
-    /// Slip angle of the largest force, searched up to 1.5 rad; `None` where the force still grows there.
+    /// Slip angle of the largest force, up to 1.5 rad; `None` where the force still grows there, or B or D is not positive.
+    ///
+    /// The force is largest where C atan(z) = pi/2, z = B a - E (B a - atan(B a)); with E above 1 z itself may turn back before.
     #[must_use]
     pub fn peak_slip_rad(&self) -> Option<f64> {
-        const STEP_RAD: f64 = 1e-3;
         const END_RAD: f64 = 1.5;
-        let mut best = 0.0;
-        let mut at_rad = 0.0;
-        for k in 1..=(END_RAD / STEP_RAD) as usize {
-            let a_rad = k as f64 * STEP_RAD;
-            let f = self.normalized_force(a_rad);
-            if f > best {
-                best = f;
-                at_rad = a_rad;
-            }
+        let Self { b, c, d, e } = *self;
+        if !(b > 0.0 && d > 0.0 && c > 0.0) {
+            return None;
         }
-        (at_rad > 0.0 && at_rad < END_RAD - STEP_RAD / 2.0).then_some(at_rad)
+        let z = |ba: f64| ba - e * (ba - ba.atan());
+        let turns_back = if e > 1.0 { (e - 1.0).recip().sqrt() } else { f64::INFINITY };
+        let end = (b * END_RAD).min(turns_back);
+        let asked = if c > 1.0 { (FRAC_PI_2 / c).tan() } else { f64::INFINITY };
+        if z(end) < asked {
+            return (end == turns_back).then_some(turns_back / b);
+        }
+        let (mut low, mut high) = (0.0, end);
+        // Until nothing lies between.
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if z(middle) < asked { low = middle } else { high = middle }
+        }
+        (high < b * END_RAD).then_some(high / b)
     }
 
     /// The largest F_y/F_z up to a slip angle.
@@ -144,6 +154,15 @@ mod tests {
             let f = tire.normalized_force(a);
             prop_assert!(f.abs() <= tire.d + 1e-12);
             prop_assert_eq!(f, -tire.normalized_force(-a));
+        }
+
+        #[test]
+        fn no_force_is_larger_than_at_the_peak(tire in tires(), c in 0.9..2.0, e in -2.0..2.0, share in 0.0..1.0) {
+            let tire = MagicFormula { c, e, ..tire };
+            let peak_rad = tire.peak_slip_rad();
+            let most = tire.normalized_force(peak_rad.unwrap_or(1.5));
+            prop_assert!(tire.normalized_force(share * 1.5) <= most + 1e-12);
+            prop_assert!(peak_rad.is_none_or(|peak| peak < 1.5));
         }
 
         #[test]

@@ -24,14 +24,16 @@ pub struct Linearization {
     pub window_costs: Vec<f64>,
     /// Residuals that count.
     pub residuals: usize,
+    /// By how much the best start states alone lower the cost of the linearized problem.
+    by_starts: f64,
     eliminations: Vec<Elimination>,
 }
 
 impl Linearization {
-    /// The objective alone.
+    /// By how much a step of the free parameters, and the best start states for it, lower the cost of the linearized problem.
     #[must_use]
-    pub fn evaluation(&self) -> Evaluation {
-        Evaluation { cost: self.cost, window_costs: self.window_costs.clone(), residuals: self.residuals }
+    pub fn foretold(&self, step: &DVector<f64>) -> f64 {
+        self.by_starts - step.dot(&(&self.information * step + &self.gradient * 2.0))
     }
 
     /// The best start states after a step of the free parameters.
@@ -50,6 +52,8 @@ impl Linearization {
 struct Elimination {
     offset: Vector2<f64>,
     slope: Matrix2xX<f64>,
+    /// By how much the best start alone lowers the cost.
+    gain: f64,
 }
 
 struct WindowPart {
@@ -78,7 +82,8 @@ pub fn linearize<M: Rollout>(
         .map(|(window, start)| {
             // The number of derivatives is fixed at compile time; take the smallest that holds them all.
             match free.len() + 2 {
-                0..=4 => part::<M, 4>(problem, &free, parameters, *start, window),
+                0..=2 => part::<M, 2>(problem, &free, parameters, *start, window),
+                3..=4 => part::<M, 4>(problem, &free, parameters, *start, window),
                 5..=8 => part::<M, 8>(problem, &free, parameters, *start, window),
                 9..=12 => part::<M, 12>(problem, &free, parameters, *start, window),
                 13..=16 => part::<M, 16>(problem, &free, parameters, *start, window),
@@ -103,6 +108,7 @@ pub fn linearize<M: Rollout>(
         window_information: Vec::with_capacity(parts.len()),
         window_costs: Vec::with_capacity(parts.len()),
         residuals: 0,
+        by_starts: 0.0,
         eliminations: Vec::with_capacity(parts.len()),
     };
     for part in parts {
@@ -113,6 +119,7 @@ pub fn linearize<M: Rollout>(
         sum.window_gradients.push(part.gradient);
         sum.window_information.push(part.information);
         sum.window_costs.push(part.cost);
+        sum.by_starts += part.elimination.gain;
         sum.eliminations.push(part.elimination);
     }
     for (row, &j) in free.iter().enumerate() {
@@ -126,21 +133,10 @@ pub fn linearize<M: Rollout>(
     sum
 }
 
-/// The objective at a point, without derivatives.
-#[derive(Debug, Clone, Default)]
-pub struct Evaluation {
-    /// The objective.
-    pub cost: f64,
-    /// The share of every window in it.
-    pub window_costs: Vec<f64>,
-    /// Residuals that count.
-    pub residuals: usize,
-}
-
-/// Evaluates the objective at given parameters (all of the model's) and start states (one a window).
+/// The objective at given parameters (all of the model's) and start states (one a window), without derivatives.
 #[must_use]
-pub fn evaluate<M: Rollout>(problem: &Problem<'_, M>, parameters: &[f64], starts: &[[f64; 2]]) -> Evaluation {
-    let windows: Vec<(f64, usize)> = problem
+pub fn cost<M: Rollout>(problem: &Problem<'_, M>, parameters: &[f64], starts: &[[f64; 2]]) -> f64 {
+    let windows: Vec<f64> = problem
         .windows
         .par_iter()
         .zip(starts)
@@ -151,22 +147,14 @@ pub fn evaluate<M: Rollout>(problem: &Problem<'_, M>, parameters: &[f64], starts
                 problem.model.measured(window, measured);
                 let scaled = residuals(problem, measured, predicted);
                 let (square, n) = scaled.fold((0.0, 0), |(s, n), (_, r)| (s + r * r, n + 1));
-                (loss(square, n, problem.robust_k).0, n)
+                loss(square, n, problem.robust_k).0
             },
         )
         .collect();
-    let priors: f64 = problem
-        .parameters
-        .iter()
-        .zip(parameters)
-        .filter_map(|(p, v)| p.prior.filter(|_| p.free).map(|prior| ((v - prior.mean) / prior.sigma).powi(2)))
-        .sum();
-    let window_costs: Vec<f64> = windows.iter().map(|w| w.0).collect();
-    Evaluation {
-        cost: window_costs.iter().sum::<f64>() + priors,
-        window_costs,
-        residuals: windows.iter().map(|w| w.1).sum(),
-    }
+    let priors = problem.parameters.iter().zip(parameters).filter_map(|(p, v)| {
+        p.prior.filter(|_| p.free).map(|prior| ((v - prior.mean) / prior.sigma).powi(2))
+    });
+    windows.iter().sum::<f64>() + priors.sum::<f64>()
 }
 
 /// The residuals that are measured, with their place.
@@ -291,12 +279,19 @@ fn eliminated(cost: f64, n: usize, jtj: &DMatrix<f64>, jtr: &DVector<f64>) -> Wi
     // A start that the outputs do not show stays where it is.
     let inverse = (start_block + Matrix2::identity() * 1e-12).try_inverse().unwrap_or_else(Matrix2::zeros);
     let cross = jtj.view((p, 0), (2, p)).into_owned();
-    let offset = inverse * Vector2::new(jtr[p], jtr[p + 1]);
+    let toward = Vector2::new(jtr[p], jtr[p + 1]);
+    let offset = inverse * toward;
     let slope =
         Matrix2xX::from_fn(p, |r, c| inverse[(r, 0)] * cross[(0, c)] + inverse[(r, 1)] * cross[(1, c)]);
     let information = jtj.view((0, 0), (p, p)) - cross.transpose() * &slope;
     let gradient = jtr.rows(0, p) - cross.transpose() * offset;
-    WindowPart { cost, residuals: n, information, gradient, elimination: Elimination { offset, slope } }
+    WindowPart {
+        cost,
+        residuals: n,
+        information,
+        gradient,
+        elimination: Elimination { offset, slope, gain: offset.dot(&toward) },
+    }
 }
 
 #[cfg(test)]

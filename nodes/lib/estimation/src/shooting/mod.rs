@@ -20,8 +20,8 @@ mod solve;
 
 use gripsight_model::Window;
 
-pub use linearize::{Evaluation, Linearization, evaluate, linearize};
-pub use solve::{Descent, Fit, StopReason, descend, fit};
+pub use linearize::{Linearization, cost, linearize};
+pub use solve::{Fit, StopReason, fit};
 
 /// What is known of a parameter beforehand.
 #[derive(Debug, Clone, Copy, PartialEq)]

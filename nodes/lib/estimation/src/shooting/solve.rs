@@ -3,7 +3,7 @@
 use gripsight_model::Rollout;
 use nalgebra::{DMatrix, DVector};
 
-use super::{Evaluation, Linearization, Parameter, Problem, evaluate, linearize};
+use super::{Linearization, Parameter, Problem, cost, linearize};
 
 /// Why a fit ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -100,28 +100,32 @@ impl Fit {
 /// Most clusters of the covariance: enough for its rank, few enough that a long drive's clusters outlast a corner.
 const CLUSTERS: usize = 40;
 
-/// Where a descent has come to.
-#[derive(Debug, Clone)]
-pub struct Descent {
-    /// All parameters of the model.
-    pub parameters: Vec<f64>,
-    /// Start state of every window.
-    pub starts: Vec<[f64; 2]>,
-    /// The objective there.
-    pub at: Evaluation,
-    /// Why it ended.
-    pub stop: StopReason,
-    /// Steps taken.
-    pub iterations: usize,
-}
-
 /// Fits the free parameters of a problem, from its start values and the given start states (else the model's guesses).
 #[must_use]
 pub fn fit<M: Rollout>(problem: &Problem<'_, M>, starts: Option<Vec<[f64; 2]>>) -> Fit {
     let free = problem.free();
-    let (end, around) = run(problem, &free, starts);
-    let Descent { parameters, starts, stop, iterations, .. } = end;
-    let linearization = around.unwrap_or_else(|| linearize(problem, &parameters, &starts));
+    let mut parameters: Vec<f64> = problem.parameters.iter().map(|p| p.start.clamp(p.low, p.high)).collect();
+    let mut starts =
+        starts.unwrap_or_else(|| problem.windows.iter().map(|w| problem.model.start_guess(w)).collect());
+    let mut here = linearize(problem, &parameters, &starts);
+    let mut damping = Damping(1e-3);
+    let mut iterations = 0;
+    let mut stop = StopReason::MaxIterations;
+    if !here.cost.is_finite() {
+        stop = StopReason::NotFinite;
+    }
+    while stop == StopReason::MaxIterations && iterations < problem.max_iterations {
+        iterations += 1;
+        match step(problem, &free, &parameters, &starts, &here, &mut damping) {
+            Some((trial, trial_starts, there)) => {
+                if here.cost - there.cost < problem.tolerance * here.cost {
+                    stop = StopReason::Converged;
+                }
+                (parameters, starts, here) = (trial, trial_starts, there);
+            }
+            None => stop = StopReason::NoDescent,
+        }
+    }
     let on_bound = free
         .iter()
         .copied()
@@ -131,50 +135,26 @@ pub fn fit<M: Rollout>(problem: &Problem<'_, M>, starts: Option<Vec<[f64; 2]>>) 
             parameters[j] <= p.low + margin || parameters[j] >= p.high - margin
         })
         .collect();
-    Fit { parameters, starts, linearization, on_bound, stop, iterations, free }
+    Fit { parameters, starts, linearization: here, on_bound, stop, iterations, free }
 }
 
-/// [`fit`] without the derivatives at its end, where only the values are wanted.
-#[must_use]
-pub fn descend<M: Rollout>(problem: &Problem<'_, M>, starts: Option<Vec<[f64; 2]>>) -> Descent {
-    run(problem, &problem.free(), starts).0
-}
+/// How far a step stays behind that of Gauss and Newton: what is added to the information's diagonal, as a share of it.
+struct Damping(f64);
 
-/// Descends; with the problem around the end where it is known.
-fn run<M: Rollout>(
-    problem: &Problem<'_, M>,
-    free: &[usize],
-    starts: Option<Vec<[f64; 2]>>,
-) -> (Descent, Option<Linearization>) {
-    let mut parameters: Vec<f64> = problem.parameters.iter().map(|p| p.start.clamp(p.low, p.high)).collect();
-    let mut starts =
-        starts.unwrap_or_else(|| problem.windows.iter().map(|w| problem.model.start_guess(w)).collect());
-    let mut here = linearize(problem, &parameters, &starts);
-    let mut damping = 1e-3;
-    let mut iterations = 0;
-    let ended = |here: Linearization, parameters, starts, stop, iterations| {
-        let at = here.evaluation();
-        (Descent { parameters, starts, at, stop, iterations }, Some(here))
-    };
-    if !here.cost.is_finite() {
-        return ended(here, parameters, starts, StopReason::NotFinite, iterations);
+impl Damping {
+    const LEAST: f64 = 1e-9;
+    /// By how much a step that fails raises it, and one that succeeds lowers it at most.
+    const STRIDE: f64 = 5.0;
+
+    /// Follows how well the linearized problem foretold the cost (Nielsen, Damping parameter in Marquardt's method, 1999): lowered by its stride after
+    /// every success, every other step would fail. `ratio`: by how much the cost fell over by how much it was foretold to.
+    fn succeeded(&mut self, ratio: f64) {
+        self.0 = (self.0 * (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / Self::STRIDE)).max(Self::LEAST);
     }
-    while iterations < problem.max_iterations {
-        iterations += 1;
-        let Some((trial, trial_starts, at)) = step(problem, free, &parameters, &starts, &here, &mut damping)
-        else {
-            return ended(here, parameters, starts, StopReason::NoDescent, iterations);
-        };
-        let change = (here.cost - at.cost) / here.cost.max(f64::MIN_POSITIVE);
-        (parameters, starts) = (trial, trial_starts);
-        let converged = change < problem.tolerance;
-        if converged || iterations == problem.max_iterations {
-            let stop = if converged { StopReason::Converged } else { StopReason::MaxIterations };
-            return (Descent { parameters, starts, at, stop, iterations }, None);
-        }
-        here = linearize(problem, &parameters, &starts);
+
+    fn failed(&mut self) {
+        self.0 *= Self::STRIDE;
     }
-    ended(here, parameters, starts, StopReason::MaxIterations, iterations)
 }
 
 /// Finds a step that lowers the cost, raising the damping until one does.
@@ -184,8 +164,8 @@ fn step<M: Rollout>(
     parameters: &[f64],
     starts: &[[f64; 2]],
     here: &Linearization,
-    damping: &mut f64,
-) -> Option<(Vec<f64>, Vec<[f64; 2]>, Evaluation)> {
+    damping: &mut Damping,
+) -> Option<(Vec<f64>, Vec<[f64; 2]>, Linearization)> {
     let room = |bound: fn(&Parameter) -> f64| {
         DVector::from_iterator(
             free.len(),
@@ -193,10 +173,12 @@ fn step<M: Rollout>(
         )
     };
     let (low, high) = (room(|p| p.low), room(|p| p.high));
-    for _ in 0..12 {
+    // Damping changes no step of the start states alone.
+    let attempts = if free.is_empty() { 1 } else { 12 };
+    for attempt in 0..attempts {
         let mut information = here.information.clone();
         for a in 0..free.len() {
-            information[(a, a)] += *damping * information[(a, a)].max(1e-12);
+            information[(a, a)] += damping.0 * information[(a, a)].max(1e-12);
         }
         if let Some(step) = within(&information, &here.gradient, &low, &high) {
             let mut trial = parameters.to_vec();
@@ -206,13 +188,18 @@ fn step<M: Rollout>(
             }
             let taken = DVector::from_iterator(free.len(), free.iter().map(|&j| trial[j] - parameters[j]));
             let trial_starts = here.starts_after(&taken, starts);
-            let at = evaluate(problem, &trial, &trial_starts);
-            if at.cost < here.cost {
-                *damping = (*damping * 0.2).max(1e-9);
-                return Some((trial, trial_starts, at));
+            // Most steps succeed, and then the derivatives there are wanted; after one that did not, the cost alone is asked for first.
+            if attempt > 0 && cost(problem, &trial, &trial_starts) >= here.cost {
+                damping.failed();
+                continue;
+            }
+            let there = linearize(problem, &trial, &trial_starts);
+            if there.cost < here.cost {
+                damping.succeeded((here.cost - there.cost) / here.foretold(&taken));
+                return Some((trial, trial_starts, there));
             }
         }
-        *damping = (*damping * 5.0).max(1e-6);
+        damping.failed();
     }
     None
 }
@@ -277,6 +264,20 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    #[test]
+    fn damping_falls_only_after_what_was_foretold() {
+        let after = |ratio: f64| {
+            let mut damping = Damping(1.0);
+            damping.succeeded(ratio);
+            damping.0
+        };
+        approx::assert_relative_eq!(after(1.0), 0.2);
+        approx::assert_relative_eq!(after(0.5), 1.0);
+        assert!(after(0.1) > 1.0);
+        // Where nothing was foretold, as of no parameters.
+        approx::assert_relative_eq!(after(f64::NAN), 0.2);
+    }
 
     proptest! {
         #[test]

@@ -145,10 +145,25 @@ fn the_gradient_is_the_derivative_of_the_cost() {
         },
         None,
     );
-    let at = |a: f64| evaluate(&problem, &[a, 1.0], &found.starts).cost;
+    let at = |a: f64| cost(&problem, &[a, 1.0], &found.starts);
     let here = linearize(&problem, &[20.0, 1.0], &found.starts);
     let numeric = (at(20.001) - at(19.999)) / 0.002;
     approx::assert_relative_eq!(2.0 * here.gradient[0], numeric, max_relative = 1e-4);
+}
+
+#[test]
+fn a_small_step_lowers_the_cost_as_foretold() {
+    let plant = plant(0.01, 5);
+    let windows = tile(&[1000], 50);
+    let parameters = parameters();
+    let problem = Problem { robust_k: f64::INFINITY, ..looked_at(&plant, &windows, &parameters) };
+    // Near the solution, so that the starts are off by more than the parameters.
+    let (at, step) = ([40.5, 0.32], nalgebra::dvector![-0.3, -0.01]);
+    let starts: Vec<[f64; 2]> = windows.iter().map(|w| plant.start_guess(w)).collect();
+    let here = linearize(&problem, &at, &starts);
+    let there = [at[0] + step[0], at[1] + step[1]];
+    let fallen = here.cost - cost(&problem, &there, &here.starts_after(&step, &starts));
+    approx::assert_relative_eq!(fallen, here.foretold(&step), max_relative = 1e-2);
 }
 
 #[test]

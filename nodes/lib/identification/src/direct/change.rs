@@ -1,24 +1,25 @@
 //! Whether the grip stayed the same over a run: tires fitted to two floors are those of neither.
 //!
-//! At some places in time D of both axles is fitted anew to what lies before and to what lies after, everything else held; the place at which both together
-//! fit best counts. A floor changed there if an axle's D differs by more than its uncertainty and by more than what tires and models make of one floor, and
+//! D of both axles is fitted anew to what lies before a place in time and to what lies after it, everything else held. The place is where the linearized
+//! problem gains most, then where each window fits better with the D of its side. A floor changed there if an axle's D differs by more than its uncertainty and by more than what tires and models make of one floor, and
 //! if both sides came near their D: one that was not come near rests on the curve's form, too, and then both axles' D have to differ by as much.
 
 use std::fmt;
+use std::ops::Range;
 
-use gripsight_estimation::shooting::{Descent, Fit, Parameter, Problem, TOLERANCE, descend, fit};
+use gripsight_estimation::shooting::{Fit, Linearization, Parameter, Problem, TOLERANCE, fit};
 use gripsight_model::Window;
 use gripsight_vehicle::GRAVITY_MPS2;
+use nalgebra::{Matrix2, Vector2};
 use serde::Serialize;
 
-use super::{ROBUST_K, SEARCH_TOLERANCE, SPREAD, thinned, thinning};
+use super::{ROBUST_K, SEARCH_TOLERANCE, SPREAD};
 use crate::data::{Data, quantile};
 use crate::rollout::TireRollout;
 use crate::tires::D_BOUNDS;
 use crate::{Estimate, PerAxle};
 
-/// Parts between whose ends the change is looked for; fewer windows than this on a side say nothing.
-const PARTS: usize = 10;
+/// Fewer windows on a side say nothing.
 const LEAST_WINDOWS: usize = 10;
 /// How often the place is moved to where it fits better.
 const REFINED: usize = 3;
@@ -65,31 +66,24 @@ pub(super) fn change_within(
     sigma: &[f64; 2],
 ) -> Option<GripChange> {
     let windows: Vec<Window> = data.windows.iter().map(|(w, _)| *w).collect();
+    let last = windows.len().checked_sub(LEAST_WINDOWS)?;
     let on = OnOneFloor { model, sigma };
     // D moves where the windows begin only a little: each fit begins where they do with one D.
-    let starts = on.searched(&windows, parameters, None, false).starts;
-    // A long drive's coarse place shows in some of its windows.
-    let every = thinning(&windows);
-    let few = thinned(&windows);
-    let few_starts: Vec<[f64; 2]> = starts.iter().copied().step_by(every).collect();
-    let cost = |windows: &[Window], starts: &[[f64; 2]]| {
-        on.searched(windows, parameters, Some(starts.to_vec()), true).at.cost
-    };
+    let starts = on.fitted(&windows, parameters, None, Peaks::Held).starts;
+    let fitted =
+        |windows, starts: &[[f64; 2]], peaks| on.fitted(windows, parameters, Some(starts.to_vec()), peaks);
+    let around = fitted(&windows, &starts, Peaks::Linearized).linearization;
+    let mut place = (LEAST_WINDOWS..=last).max_by(|&a, &b| gain(&around, a).total_cmp(&gain(&around, b)))?;
     let sides = |place: usize| {
-        let fitted = |windows, starts: &[[f64; 2]]| on.fitted(windows, parameters, starts.to_vec());
-        (fitted(&windows[..place], &starts[..place]), fitted(&windows[place..], &starts[place..]))
+        (
+            fitted(&windows[..place], &starts[..place], Peaks::Free),
+            fitted(&windows[place..], &starts[place..], Peaks::Free),
+        )
     };
-    let costs =
-        |side: &Fit| on.searched(&windows, &side.parameters, Some(starts.clone()), false).at.window_costs;
-    let last = windows.len().checked_sub(LEAST_WINDOWS)?;
-    let places = (1..PARTS).map(|k| k * windows.len() / PARTS).filter(|k| (LEAST_WINDOWS..=last).contains(k));
-    let coarse = places.map(|place| {
-        let (before, after) = few.split_at(place.div_ceil(every));
-        let (starts_before, starts_after) = few_starts.split_at(before.len());
-        (place, cost(before, starts_before) + cost(after, starts_after))
-    });
-    // The coarse place mixes both floors on one side: from there to where each window fits better with the other side's D.
-    let (mut place, _) = coarse.min_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    let costs = |side: &Fit| {
+        on.fitted(&windows, &side.parameters, Some(starts.clone()), Peaks::Held).linearization.window_costs
+    };
+    // That place mixes both floors on one side: from there to where each window fits better with the other side's D.
     let (mut before, mut after) = sides(place);
     for _ in 0..REFINED {
         let better = between(&costs(&before), &costs(&after), last)?;
@@ -137,6 +131,27 @@ pub(super) fn change_within(
     })
 }
 
+/// By how much a D of its own on either side of a place lowers the cost of the linearized problem.
+fn gain(around: &Linearization, place: usize) -> f64 {
+    let side = |windows: Range<usize>| {
+        let information =
+            around.window_information[windows.clone()].iter().fold(Matrix2::zeros(), |sum, i| sum + i);
+        let gradient = around.window_gradients[windows].iter().fold(Vector2::zeros(), |sum, g| sum + g);
+        information.cholesky().map_or(0.0, |root| gradient.dot(&root.solve(&gradient)))
+    };
+    side(0..place) + side(place..around.window_costs.len())
+}
+
+/// What a fit does with D of both axles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Peaks {
+    /// They stay, and only the windows' starts are fitted.
+    Held,
+    /// They stay, and how the cost depends on them is wanted.
+    Linearized,
+    Free,
+}
+
 /// Fits of D of both axles, everything else held.
 struct OnOneFloor<'a> {
     model: &'a TireRollout<'a>,
@@ -144,43 +159,23 @@ struct OnOneFloor<'a> {
 }
 
 impl OnOneFloor<'_> {
-    fn with<R>(
-        &self,
-        windows: &[Window],
-        at: &[f64],
-        (peaks_free, tolerance): (bool, f64),
-        solved: impl FnOnce(&Problem<'_, TireRollout<'_>>) -> R,
-    ) -> R {
+    fn fitted(&self, windows: &[Window], at: &[f64], starts: Option<Vec<[f64; 2]>>, peaks: Peaks) -> Fit {
         let parameter = |(j, &start): (usize, &f64)| {
-            let free = peaks_free && D.contains(&j);
+            let free = peaks != Peaks::Held && D.contains(&j);
             let (low, high) = if free { D_BOUNDS } else { (f64::NEG_INFINITY, f64::INFINITY) };
             Parameter { start, low, high, free, prior: None }
         };
         let parameters: Vec<Parameter> = at.iter().enumerate().map(parameter).collect();
-        solved(&Problem {
+        let problem = Problem {
             model: self.model,
             windows,
             sigma: self.sigma,
             parameters: &parameters,
             robust_k: ROBUST_K,
-            tolerance,
-            max_iterations: 15,
-        })
-    }
-
-    fn fitted(&self, windows: &[Window], at: &[f64], starts: Vec<[f64; 2]>) -> Fit {
-        self.with(windows, at, (true, TOLERANCE), |problem| fit(problem, Some(starts)))
-    }
-
-    /// Costs to compare, of the start states alone or of both peaks, too.
-    fn searched(
-        &self,
-        windows: &[Window],
-        at: &[f64],
-        starts: Option<Vec<[f64; 2]>>,
-        peaks_free: bool,
-    ) -> Descent {
-        self.with(windows, at, (peaks_free, SEARCH_TOLERANCE), |problem| descend(problem, starts))
+            tolerance: if peaks == Peaks::Free { TOLERANCE } else { SEARCH_TOLERANCE },
+            max_iterations: if peaks == Peaks::Linearized { 0 } else { 15 },
+        };
+        fit(&problem, starts)
     }
 }
 
