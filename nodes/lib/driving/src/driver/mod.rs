@@ -4,8 +4,8 @@
 //! | --- | --- |
 //! | nothing | half of the start's, and a step beyond what the car turned with, up to the start's |
 //! | accepted: the peak is known | a share of the most likely peak, step by step from what the set promises |
-//! | accepted within what was shown | a step beyond what was driven, so that the next drive shows more, up to the most likely peak; no less than was driven, nor than without a set |
-//! | a prior's peak (provisional) | up to that and to the peak that the data find most likely, in larger steps |
+//! | accepted within what was shown | a step beyond what was driven, so that the next drive shows more, and most of the way to the most likely peak; no less than was driven, nor than without a set |
+//! | a prior's peak (provisional) | most of the way to that and to the peak that the data find most likely, in larger steps |
 //! | the car slid, or the identifier warns | what the road gave, then half of the way back with each half lap, once a set has seen it or was not withdrawn |
 
 mod caught;

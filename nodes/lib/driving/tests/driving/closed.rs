@@ -341,7 +341,7 @@ fn sets_are_taken_for_what_they_are_good_for() {
     // A peak that is found lower later holds against a plan that was driven without a slide.
     drive(&mut known, |_| 0.8, 0.0, 60.0);
     known.take(TireSet { likely_peaks: Some([0.7; 2]), ..set(0.7, Trust::Accepted) }).unwrap();
-    assert!(known.grip() <= 0.7 * 1.001, "{}", known.grip());
+    assert!(known.grip() <= settings.share * 0.7 * 1.001, "{}", known.grip());
 
     // It is not: a step beyond what was driven, but not beyond what is likely.
     let mut within = driver(TireSet::start());
@@ -349,7 +349,8 @@ fn sets_are_taken_for_what_they_are_good_for() {
     within.take(set(0.48, Trust::AcceptedWithin)).unwrap();
     approx::assert_relative_eq!(within.grip(), settings.step * start, max_relative = 1e-2);
     within.take(TireSet { likely_peaks: Some([0.55; 2]), ..set(0.48, Trust::AcceptedWithin) }).unwrap();
-    approx::assert_relative_eq!(within.grip(), 0.96 * 0.55, max_relative = 1e-2);
+    // Nor at once: most of the way there.
+    approx::assert_relative_eq!(within.grip(), start + 0.7 * (0.96 * 0.55 - start), max_relative = 1e-2);
     // What the car has done is no less for a set from a drive that showed little.
     within.take(set(0.25, Trust::AcceptedWithin)).unwrap();
     approx::assert_relative_eq!(within.grip(), 1.05 * start, max_relative = 1e-2);
