@@ -111,6 +111,16 @@ impl Data {
         Ok(data)
     }
 
+    /// The same with the other sign of v_y.
+    pub(crate) fn with_v_y_turned(&self) -> Self {
+        let mut turned = self.clone();
+        for segment in &mut turned.segments {
+            segment.v_y_mps.iter_mut().for_each(|v_y| *v_y = -*v_y);
+        }
+        turned.a_x_mps2 = turned.segments.iter().map(forward_acceleration).collect();
+        turned
+    }
+
     /// Leaves out what lies before a time, but for the shortest drive that can be fitted. The rest is shared out so that every part gets some.
     pub(crate) fn leave_out_before(&mut self, time_s: f64) {
         let begin_s = |w: &Window| {

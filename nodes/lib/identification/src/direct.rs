@@ -240,6 +240,14 @@ const FIRST_STIFFNESS: f64 = 8.0;
 /// The search ends where a step lowers the cost by less than this share: what is searched for differs by [`WORTH`].
 const SEARCH_TOLERANCE: f64 = 1e-4;
 
+/// Whether the speeds driven part a lever arm from the stiffnesses. In a steady turn it adds l a_y/v^2 to the rear slip where the tires add a_y/(g k):
+/// what it adds has to halve over the speeds.
+pub(crate) fn speeds_part(data: &Data) -> bool {
+    let mut speeds: Vec<f64> = data.samples(|s, k| s.v_x_mps[k]).collect();
+    let [slow, fast] = [0.05, 0.95].map(|share| quantile(&mut speeds, share).unwrap_or(f64::NAN));
+    fast > std::f64::consts::SQRT_2 * slow
+}
+
 /// Windows of a drive, evenly over it, of which there are not too many to search with.
 fn thinned(windows: &[Window]) -> Vec<Window> {
     windows.iter().copied().step_by(thinning(windows)).collect()
@@ -342,7 +350,7 @@ impl Fitter<'_> {
             }
         }
         let mut shift = [0.0; PARAMETERS];
-        if best.linearization.cost < (1.0 - WORTH) * found.linearization.cost && self.speeds_part() {
+        if best.linearization.cost < (1.0 - WORTH) * found.linearization.cost && speeds_part(self.data) {
             (all, found) = (freed, best);
         } else {
             shift = std::array::from_fn(|j| best.parameters[j] - found.parameters[j]);
@@ -408,14 +416,6 @@ impl Fitter<'_> {
                 rear: d_sigma(own.rear.d, &peak.rear),
             },
         }))
-    }
-
-    /// Whether the speeds driven part a lever arm from the stiffnesses. In a steady turn it adds l a_y/v^2 to the rear slip where the tires add a_y/(g k):
-    /// what it adds has to halve over the speeds.
-    fn speeds_part(&self) -> bool {
-        let mut speeds: Vec<f64> = self.data.samples(|s, k| s.v_x_mps[k]).collect();
-        let [slow, fast] = [0.05, 0.95].map(|share| quantile(&mut speeds, share).unwrap_or(f64::NAN));
-        fast > std::f64::consts::SQRT_2 * slow
     }
 
     /// Slip angles, and F_y/F_z at them, along the fitted trajectories, where windows show them and what follows answers to them.

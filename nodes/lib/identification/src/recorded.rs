@@ -84,6 +84,13 @@ pub enum Objection {
     NoYawRate,
     /// The poses do not carry an estimate.
     PoorPoses,
+    /// Nothing recorded checks v_y, and a car follows it far better with the other sign.
+    TurnedLateralSpeed {
+        /// How far any tires miss it as it is recorded,
+        scatter_mps: f64,
+        /// and with the other sign.
+        turned_scatter_mps: f64,
+    },
 }
 
 impl fmt::Display for Objection {
@@ -101,6 +108,10 @@ impl fmt::Display for Objection {
                     "v_y is not measured: it repeats itself while the car turns, and no pose is recorded; {WAY_ON}"
                 )
             }
+            Self::TurnedLateralSpeed { scatter_mps, turned_scatter_mps } => write!(
+                f,
+                "v_y has the wrong sign, as it seems: any tires miss it by {scatter_mps:.3} m/s, and by {turned_scatter_mps:.3} m/s if it is turned; the line `v_y: {{topic: ..., field: ..., sign: -1}}` of a topics file turns it, and poses or a lateral accelerometer would check it"
+            ),
             Self::NoYawRate => write!(
                 f,
                 "the yaw rate is not measured: it repeats itself while the car turns, and no pose is recorded; map a gyroscope (`yaw_rate:` in a topics file) or a pose"

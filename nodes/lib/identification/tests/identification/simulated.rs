@@ -281,6 +281,18 @@ fn a_signal_that_is_turned_or_in_another_unit_is_refused_with_the_line_that_mend
             outcome.reasons
         );
     }
+    // Where nothing is recorded beside v_y, the tires that would be needed to follow it tell.
+    let mut bare = honest.clone();
+    (bare.a_x_mps2, bare.a_y_mps2, bare.gyro_yaw_rate_radps) = Default::default();
+    (bare.x_m, bare.y_m, bare.yaw_rad) = Default::default();
+    for (turned, sign) in [(false, 1.0), (true, -1.0)] {
+        let mut sequence = bare.clone();
+        scaled(&mut sequence.v_y_mps, sign);
+        let outcome = identify(&sequence, &vehicle, None, None, &quick(), &mut |_| {}).unwrap();
+        let said = outcome.reasons.iter().any(|r| r.contains("v_y has the wrong sign"));
+        assert_eq!(said, turned, "{:?}", outcome.reasons);
+        assert!(!(turned && outcome.accepted));
+    }
     // A unit that nothing is fitted to is not worth a refusal.
     let mut imu = honest.clone();
     scaled(&mut imu.a_y_mps2, 1.0 / 9.81);
