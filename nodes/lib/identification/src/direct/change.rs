@@ -28,7 +28,7 @@ const SIGNIFICANT: f64 = 4.0;
 /// and by this share of the smaller: slips of other sizes, warm tires and a model that is too simple make less of one floor.
 const NOTICEABLE: f64 = 0.2;
 /// A side that turned with at least this share of its mean D came near it. One that turned with less than the other share says nothing. Chosen on development
-/// drives on one floor, of which either half has its own pace (`envelope paces`: of 60 others none is cut), nor is any of 150 draws at one (`envelope draws`).
+/// drives on one floor, of which either half has its own pace (`envelope paces`: of 60 others none is cut), and one of 300 draws at one (`envelope draws`).
 const SHOWN: f64 = 0.75;
 const SHOWN_AT_ALL: f64 = 0.5;
 /// What a side turned with is this quantile of the lateral acceleration.
