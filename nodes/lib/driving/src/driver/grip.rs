@@ -10,7 +10,8 @@ use crate::tires::{TireSet, Trust};
 /// Share of the most likely peak to explore up to, where the set promises less.
 const LIKELY: f64 = 0.96;
 /// Share of the way from what was driven to where one would explore to that is gone at once: how far a peak that was not reached is off grows with how far
-/// off it was seen from. Of 1, 0.7 and 0.5, 0.7 was fastest on `club`, `esses`, `clover` and `harbor`.
+/// off it was seen from. On `club`, `esses`, `clover` and `harbor` the 1:10 car is as fast as with 1 or
+/// faster, and less often far behind.
 const AT_ONCE: f64 = 0.7;
 /// Grip planned over what half a lap was driven with without a slide, however little a set promises: from a drive that showed little the promise may be
 /// below what the car has done, and a plan held there would show no more.
