@@ -39,10 +39,14 @@ pub struct Change {
     pub site: &'static str,
     /// Canonical name of the effect; `tires`; or `other` for what no effect of the library does.
     pub name: &'static str,
-    /// What of the effect differs: what is reported of it, or of its parameters the one that stands out most; none of tires and `other`.
+    /// What of the effect differs: what is reported of it, or of its parameters the one that stands out most; of tires what the axle pushes with
+    /// over its load; none of `other`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameter: Option<&'static str>,
-    /// The later drive less the earlier one, with its 90 % interval; unknown (`null`) of tires and `other`.
+    /// Slip angle at which the tires' forces are compared: what both drives exceed in a twentieth of their time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_slip_rad: Option<f64>,
+    /// The later drive less the earlier one, with its 90 % interval; unknown (`null`) of `other`.
     pub difference: EffectParameter,
     /// Probability that it has changed.
     pub probability: f64,

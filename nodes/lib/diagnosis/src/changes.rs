@@ -25,6 +25,7 @@ use crate::infer::FIRST;
 use crate::inferred::Inferred;
 use crate::outcome::EffectParameter;
 use crate::sizes::{Sized, half_widths_of_difference};
+use crate::tire_change::ForceChange;
 use crate::trust::TireTrust;
 
 /// Share of a size that matters by which an effect may differ between two drives of a car that nobody has touched.
@@ -45,10 +46,17 @@ pub(crate) struct Compared {
     /// How many times larger than they may be the contradictions are that no change explains.
     pub(crate) dispersion: f64,
     terms: usize,
+    /// What the tires of front and rear axle differ by, where they differ.
+    tires: [ForceChange; 2],
 }
 
-/// Compares. `later`: the later drive, linearised in the same columns.
-pub(crate) fn compare(engine: &Engine<'_>, earlier: &Inferred, later: &Inferred) -> Option<Compared> {
+/// Compares. `later`: the later drive, linearised in the same columns; `slip_rad`: of front and rear axle, at which their forces are compared.
+pub(crate) fn compare(
+    engine: &Engine<'_>,
+    earlier: &Inferred,
+    later: &Inferred,
+    slip_rad: [f64; 2],
+) -> Option<Compared> {
     let n = earlier.columns.len();
     let scaled = |of: &Inferred| Quadratic {
         information: &of.weighed.total.information / of.dispersion,
@@ -103,7 +111,18 @@ pub(crate) fn compare(engine: &Engine<'_>, earlier: &Inferred, later: &Inferred)
         (sized.0.clone(), half_widths_of_difference(engine, effect, &sized))
     };
     let by = earlier.columns.effects.iter().enumerate().map(of).collect();
-    Some(Compared { selection, by, dispersion, terms: earlier.terms.len() })
+    let tires = {
+        let mut chosen = selection.best.clone();
+        chosen[earlier.terms.len()] = 1;
+        let other = configuration(&problem, dispersion, &terms, &chosen)?;
+        let columns: Vec<usize> = (0..TIRES).chain(n..n + TIRES).collect();
+        let covariance = other.covariance().select_rows(&columns).select_columns(&columns);
+        let before: Vec<f64> = (0..TIRES).map(|c| earlier.values[c] + other.step[c]).collect();
+        let by = other.step.rows(n, TIRES);
+        let size = engine.size(&EffectId::GripScale.spec().parameters[0]);
+        ForceChange::of_axles(size, [&before, by.as_slice()], &covariance, slip_rad)
+    };
+    Some(Compared { selection, by, dispersion, terms: earlier.terms.len(), tires })
 }
 
 /// A term's step with standard deviations where it is wide open.
@@ -288,23 +307,42 @@ impl Compared {
         Some((reported.name, EffectParameter { value, low, high, unit: reported.unit, before: Some(own) }))
     }
 
+    /// Other tires, axle by axle. One of them has changed where the tires have; the other one where its own difference stands out.
+    fn tire_changes(&self) -> Vec<Change> {
+        let [front, rear] = &self.tires;
+        let most = front.told().max(rear.told());
+        let of = |(site, axle): (Site, &ForceChange)| {
+            let alone = if axle.told() < most { decisions::chance(axle.told()) } else { 1.0 };
+            Change {
+                site: site.name(),
+                name: "tires",
+                parameter: Some("force_over_load"),
+                at_slip_rad: Some(axle.slip_rad),
+                difference: EffectParameter {
+                    value: axle.by,
+                    low: axle.by - axle.half_width,
+                    high: axle.by + axle.half_width,
+                    unit: "1",
+                    before: Some(axle.before),
+                },
+                probability: self.of_tires().min(alone),
+            }
+        };
+        [(Site::FrontAxle, front), (Site::RearAxle, rear)].map(of).to_vec()
+    }
+
     /// All that is worth a word, the likeliest first.
     pub(crate) fn changes(&self, earlier: &Inferred) -> Vec<Change> {
         let nothing =
             |unit| EffectParameter { value: f64::NAN, low: f64::NAN, high: f64::NAN, unit, before: None };
-        let mut out = vec![Change {
-            site: Site::FrontAxle.name(),
-            name: "tires",
-            parameter: None,
-            difference: nothing("1"),
-            probability: self.of_tires(),
-        }];
+        let mut out = self.tire_changes();
         for &effect in &earlier.columns.effects {
             let Some((parameter, difference)) = self.stated(earlier, effect) else { continue };
             out.push(Change {
                 site: effect.spec().sites.first().map_or("", |s| s.name()),
                 name: effect.name(),
                 parameter: Some(parameter),
+                at_slip_rad: None,
                 difference,
                 probability: self.of_effect(earlier, effect),
             });
@@ -315,6 +353,7 @@ impl Compared {
                 site: site.name(),
                 name: "other",
                 parameter: None,
+                at_slip_rad: None,
                 difference: nothing("1"),
                 probability,
             });

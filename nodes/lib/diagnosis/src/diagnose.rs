@@ -62,6 +62,12 @@ impl<'a> Request<'a> {
         }
     }
 
+    /// Whether an effect is of the library that is considered.
+    pub(crate) fn considers(&self, effect: EffectId) -> bool {
+        let among = |names: &[String]| names.iter().any(|name| EffectId::by_name(name) == Some(effect));
+        !among(self.without) && (self.only.is_empty() || among(self.only))
+    }
+
     /// The model to start from, if any.
     fn given_model(&self) -> Option<&'a ExtendedModelFile> {
         self.earlier.map(|earlier| &earlier.model).or(self.model)
@@ -112,10 +118,11 @@ pub(crate) fn explain(
     progress: &mut dyn FnMut(&str),
 ) -> Result<(Diagnosis, Inferred), GapError> {
     let Usable { recording, windows } = usable;
+    let recording = match request.earlier {
+        Some(earlier) => recording.with_channels(&earlier.common(&recording)?),
+        None => recording,
+    };
     let other = request.held_out.map(|h| Recording::beside(h, Some(&recording))).transpose()?;
-    if request.earlier.is_some_and(|earlier| !earlier.matches(&recording)) {
-        return Err(GapError::Earlier("the two drives do not record the same signals".to_owned()));
-    }
     progress("fitting the tires");
     let (tires, trust) = match (request.posterior, request.given_tires()) {
         (Some(posterior), _) if is_of(posterior, request.sequence) => (posterior.tires()?, TireTrust::free()),
@@ -293,9 +300,9 @@ pub(crate) fn library(
     recording: &Recording,
     trusted: bool,
 ) -> Result<(Vec<EffectId>, Vec<Invisible>), GapError> {
-    let known = |name: &String| EffectId::known(name);
-    let without = request.without.iter().map(known).collect::<Result<Vec<_>, _>>()?;
-    let only = request.only.iter().map(known).collect::<Result<Vec<_>, _>>()?;
+    for name in request.without.iter().chain(request.only) {
+        EffectId::known(name)?;
+    }
     let met = |need: Need| match need {
         Need::LongitudinalCommand => recording.has_command,
         Need::Accelerometer => recording.channels.contains(&gripsight_model::Channel::LateralAcceleration),
@@ -308,7 +315,7 @@ pub(crate) fn library(
     let mut library = Vec::new();
     let mut invisible = Vec::new();
     for effect in EffectId::candidates() {
-        if without.contains(&effect) || (!only.is_empty() && !only.contains(&effect)) {
+        if !request.considers(effect) {
             continue;
         }
         match effect.spec().needs.iter().find(|n| !met(**n)) {

@@ -163,19 +163,18 @@ fn held_against(
 ) -> Result<Differing, GapError> {
     let mut out = Vec::new();
     for (other, drive) in drives.iter().enumerate() {
-        // What only some drives record was left out of all of them.
-        let Some(own) = drive.as_ref().filter(|own| other == number || reference.matches(&own.recording))
-        else {
-            out.push(None);
-            continue;
-        };
         if other == number {
             out.push(Some(Vec::new()));
             continue;
         }
+        let common = drive.as_ref().map(|own| (own, reference.common(&own.recording)));
+        let Some((own, Ok(common))) = common else {
+            out.push(None);
+            continue;
+        };
         progress(&format!("holding drive {} against drive {}", other + 1, number + 1));
-        let (_, differences) =
-            reference.with_later(&own.recording, request.vehicle, &own.windows, progress)?;
+        let recording = own.recording.with_channels(&common);
+        let (_, differences) = reference.with_later(&recording, request.vehicle, &own.windows, progress)?;
         out.push(Some(differences.likely()));
     }
     Ok(out)

@@ -2,7 +2,7 @@
 
 use gripsight_estimation::Split;
 use gripsight_estimation::selection::Term;
-use gripsight_model::{EffectId, Recording};
+use gripsight_model::{Channel, EffectId, Recording};
 use gripsight_signals::DataHealth;
 use gripsight_vehicle::VehicleParameters;
 
@@ -12,10 +12,12 @@ use crate::changes::{Compared, compare};
 use crate::decisions;
 use crate::diagnose::{SEARCH_WINDOWS, explain};
 use crate::engine::Engine;
+use crate::frame::Frame;
 use crate::infer::linearised;
 use crate::inferred::Inferred;
 use crate::outcome::{Diagnosis, RankedEffect};
 use crate::sizes::{Sized, reported};
+use crate::tire_change::reached_slip_rad;
 use crate::trust::TireTrust;
 use crate::usable::{Usable, usable};
 use crate::{ExtendedModelFile, GapError, Request, Verdict};
@@ -30,6 +32,8 @@ pub struct Earlier {
     pub diagnosis: Diagnosis,
     pub(crate) inferred: Inferred,
     usable: Usable,
+    /// Effects that nobody asks for.
+    left_out: Vec<EffectId>,
     /// All that the inference left in its model, stated as a cause or not: what it is not sure of is as much in a later drive.
     pub(crate) model: ExtendedModelFile,
 }
@@ -47,7 +51,8 @@ impl Earlier {
             return Err(GapError::Earlier(diagnosis.reasons.join("; ")));
         }
         let model = inferred.model();
-        Ok(Self { diagnosis, inferred, usable, model })
+        let left_out = EffectId::candidates().filter(|e| !request.considers(*e)).collect();
+        Ok(Self { diagnosis, inferred, usable, left_out, model })
     }
 
     /// What it was explained with, in words.
@@ -59,13 +64,17 @@ impl Earlier {
         )
     }
 
-    /// Whether another recording holds the same signals.
-    pub(crate) fn matches(&self, later: &Recording) -> bool {
+    /// The channels by which both drives tell something: what one of them lacks is no change of the car.
+    pub(crate) fn common(&self, later: &Recording) -> Result<Vec<Channel>, GapError> {
         let own = &self.usable.recording;
-        own.channels == later.channels && own.has_command == later.has_command
+        if own.has_command != later.has_command {
+            let which = if own.has_command { "earlier" } else { "later" };
+            return Err(GapError::Earlier(format!("only the {which} drive records a longitudinal command")));
+        }
+        Ok(own.channels.iter().copied().filter(|c| later.channels.contains(c)).collect())
     }
 
-    /// Compares another drive of the car with it: both in the same columns, around the same tires, with nothing held, and linearised in the same way, so that a
+    /// Compares another drive of the car with it, which has the channels that both tell something by: both in the same columns, around the same tires, with nothing held, and linearised in the same way, so that a
     /// drive differs from itself by nothing. Gives the other drive, linearised there, and what differs.
     pub(crate) fn with_later(
         &self,
@@ -75,18 +84,24 @@ impl Earlier {
         progress: &mut dyn FnMut(&str),
     ) -> Result<(Inferred, Differences), GapError> {
         progress("comparing the drives");
-        let like = &self.inferred;
-        let engine = |of| Engine::new(of, vehicle, like.tires, TireTrust::file());
-        let (mut before, mut after) = (engine(&self.usable.recording), engine(recording));
+        let own = &self.usable.recording;
+        let frame =
+            Frame::of(&self.inferred, (&own.channels, &recording.channels), |e| !self.left_out.contains(&e));
+        let own = own.with_channels(&recording.channels);
+        let engine = |of| Engine::new(of, vehicle, self.inferred.tires, TireTrust::file());
+        let (mut before, mut after) = (engine(&own), engine(recording));
         let [here, there] = [&self.usable.windows, windows].map(|w| w.training.thinned(SEARCH_WINDOWS));
+        let [front, rear] = reached_slip_rad(&before, &here);
+        let [later_front, later_rear] = reached_slip_rad(&after, &there);
+        let slip_rad = [front.min(later_front), rear.min(later_rear)];
         // Where the earlier drive was linearised, and where its model is fitted to either drive: fits may end apart although nothing has changed. Where the
         // drives contradict each other the least they are compared at their best. A place that the model runs away from tells nothing.
         let mut at = |fitted: bool| {
-            let model = (&like.values[..], &like.chosen[..]);
-            let earlier = linearised(&mut before, like, model, fitted, &here)?;
-            let earlier = Inferred { chosen: like.chosen.clone(), sizes: like.sizes.clone(), ..earlier };
-            let later = linearised(&mut after, like, model, fitted, &there)?;
-            Pair::of(&before, earlier, later, like.chosen.clone())
+            let model = (&frame.values[..], &frame.chosen[..]);
+            let earlier = linearised(&mut before, &frame, model, fitted, &here)?;
+            let earlier = Inferred { chosen: frame.chosen.clone(), sizes: frame.sizes.clone(), ..earlier };
+            let later = linearised(&mut after, &frame, model, fitted, &there)?;
+            Pair::of(&before, earlier, later, frame.chosen.clone(), slip_rad)
         };
         let alike = [at(false), at(true)].into_iter().flatten();
         let least = alike.min_by(|a, b| a.compared.dispersion.total_cmp(&b.compared.dispersion));
@@ -95,8 +110,9 @@ impl Earlier {
         // that model with what has changed, as long as this is likelier.
         for _ in 0..AROUND_CHANGES {
             let Some((values, chosen)) = best.later_model() else { break };
-            let anew = linearised(&mut after, like, (&values, &chosen), true, &there);
-            let anew = anew.and_then(|later| Pair::of(&before, best.earlier.clone(), later, chosen));
+            let anew = linearised(&mut after, &frame, (&values, &chosen), true, &there);
+            let anew =
+                anew.and_then(|later| Pair::of(&before, best.earlier.clone(), later, chosen, slip_rad));
             match anew.filter(|anew| anew.is_likelier(&best)) {
                 Some(anew) => best = anew,
                 None => break,
@@ -117,8 +133,14 @@ struct Pair {
 }
 
 impl Pair {
-    fn of(engine: &Engine<'_>, earlier: Inferred, later: Inferred, around: Vec<usize>) -> Option<Self> {
-        let compared = compare(engine, &earlier, &later)?;
+    fn of(
+        engine: &Engine<'_>,
+        earlier: Inferred,
+        later: Inferred,
+        around: Vec<usize>,
+        slip_rad: [f64; 2],
+    ) -> Option<Self> {
+        let compared = compare(engine, &earlier, &later, slip_rad)?;
         Some(Self { earlier, later, around, compared })
     }
 
@@ -236,7 +258,7 @@ impl Differences {
             Verdict::Effects
         } else if likely("other") {
             Verdict::NoneOfThese
-        } else if likely("tires") {
+        } else if self.compared.of_tires() >= decisions::LIKELY {
             Verdict::TireRetuneOnly
         } else {
             Verdict::NoGap
@@ -265,6 +287,7 @@ mod tests {
             site: "steering",
             name,
             parameter: None,
+            at_slip_rad: None,
             difference: EffectParameter { value: 0.0, low: 0.0, high: 0.0, unit: "1", before: None },
             probability,
         };

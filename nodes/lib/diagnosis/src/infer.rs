@@ -16,6 +16,7 @@ use crate::budget::Scorer;
 use crate::columns::Columns;
 use crate::engine::Engine;
 use crate::finding::untried;
+use crate::frame::Frame;
 use crate::hypotheses::terms;
 use crate::inferred::Inferred;
 use crate::joint::{Joint, Weighed};
@@ -208,25 +209,24 @@ fn again(
 /// weights become those of the noise found.
 pub(crate) fn linearised(
     engine: &mut Engine<'_>,
-    like: &Inferred,
+    frame: &Frame,
     (from, chosen): (&[f64], &[usize]),
     fitted: bool,
     windows: &Windows,
 ) -> Option<Inferred> {
-    let columns = like.columns.clone();
+    let Frame { columns, library, .. } = frame;
     let mut values = from.to_vec();
     // The same sensors: no less noise than the first drive was found to have.
-    engine.sigma.clone_from(&like.sigma);
+    engine.sigma.clone_from(&frame.sigma);
     let base = engine.sigma.clone();
-    let library: Vec<EffectId> = columns.effects.iter().copied().filter(|e| like.is_open(*e)).collect();
     let there = |range: std::ops::Range<usize>| range.into_iter().any(|c| from[c] != 0.0);
     let sites: Vec<Site> = Site::ALL.into_iter().filter(|s| there(columns.of_site(*s))).collect();
     let (model, own, _) = columns.model(engine, from, |e| columns.of_effect(e).is_some_and(&there), &sites);
     let mut starts = engine.score_model(&model, &own, windows).starts;
     for round in 1.. {
-        let mut joint = Joint::around(engine, &columns, &values, &starts, windows)?;
-        differences(engine, &columns, &mut values, &starts, windows, &mut joint);
-        let terms = terms(engine, &columns, &values, &library);
+        let mut joint = Joint::around(engine, columns, &values, &starts, windows)?;
+        differences(engine, columns, &mut values, &starts, windows, &mut joint);
+        let terms = terms(engine, columns, &values, library);
         let open: Vec<usize> = terms.iter().map(|t| t.log_weights.len() - 1).collect();
         let scale = noise_scale(engine, &joint, &base, &terms, &open)?;
         let weighed = joint.weighed(&scale);
@@ -242,7 +242,7 @@ pub(crate) fn linearised(
             return Some(Inferred {
                 chosen: selection.best.clone(),
                 stated: None,
-                columns,
+                columns: columns.clone(),
                 tires: engine.nominal,
                 values,
                 confirmed,
@@ -260,7 +260,7 @@ pub(crate) fn linearised(
         }
         let around = Around {
             engine,
-            columns: &columns,
+            columns,
             terms: &terms,
             values: &values,
             starts: &starts,
@@ -360,6 +360,7 @@ fn differences(
 #[cfg(test)]
 mod tests {
     use gripsight_estimation::split;
+    use gripsight_model::Channel;
     use gripsight_vehicle::VehicleParameters;
 
     use super::*;
@@ -430,6 +431,33 @@ mod tests {
         assert_eq!(named, [EffectId::SteeringLag]);
         let (size, _) = sizes.effect(&columns, EffectId::SteeringLag).unwrap();
         assert!((size[0] - 0.06).abs() < 0.01, "{size:?}");
+    }
+
+    #[test]
+    fn a_comparison_asks_for_other_grip_beside_all_that_the_earlier_drive_has() {
+        let found = inferred(0.06, &[]);
+        let channels = [Channel::LateralVelocity, Channel::YawRate];
+        let of =
+            |considered: fn(EffectId) -> bool| Frame::of(&found, (&channels, &channels[1..]), considered);
+        let frame = of(|e| e != EffectId::GripBalance);
+        let grip = frame.columns.of_effect(EffectId::GripScale).unwrap();
+        assert_eq!((frame.values.len(), frame.values[grip.start]), (frame.columns.len(), 0.0));
+        assert_eq!(frame.sizes.values.len(), frame.values.len());
+        assert!(
+            frame.library.contains(&EffectId::GripScale)
+                && frame.columns.of_effect(EffectId::GripBalance).is_none()
+        );
+        assert_eq!(frame.sigma, [found.sigma[1]]);
+        for effect in &found.columns.effects {
+            let [before, after] = [&found.columns, &frame.columns].map(|c| c.of_effect(*effect).unwrap());
+            assert_eq!(found.values[before], frame.values[after]);
+        }
+        for site in Site::ALL {
+            let [before, after] = [&found.columns, &frame.columns].map(|c| c.of_site(site));
+            assert_eq!(found.values[before], frame.values[after]);
+        }
+        let bare = of(|_| false);
+        assert_eq!((bare.values, bare.chosen), (found.values.clone(), found.chosen.clone()));
     }
 
     #[test]

@@ -41,6 +41,7 @@ mod error;
 mod extended_file;
 mod figures;
 mod finding;
+mod frame;
 mod hypotheses;
 mod infer;
 mod inferred;
@@ -61,6 +62,7 @@ mod stated;
 mod statement;
 #[cfg(test)]
 mod testing;
+mod tire_change;
 mod trust;
 mod usable;
 mod verdict;

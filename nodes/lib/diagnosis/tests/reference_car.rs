@@ -181,6 +181,10 @@ fn of_two_drives_only_what_has_changed_is_told() {
     assert!(itself.verdict == Verdict::NoGap && itself.changes.is_empty(), "{}", text(&itself));
     let same = since(&late_too);
     assert!(matches!(same.verdict, Verdict::NoGap | Verdict::TireRetuneOnly), "{}", text(&same));
+    // What only one of them records is left out of both.
+    let (a_x_mps2, a_y_mps2) = (Vec::new(), Vec::new());
+    let without_imu = since(&StateSequence { a_x_mps2, a_y_mps2, ..late_too });
+    assert!(without_imu.effects.iter().all(|e| !e.accepted), "{}", text(&without_imu));
     let gone = since(&prompt);
     assert_eq!(named(&gone), ["steering_delay"], "{}", text(&gone));
     let delay_s = gone.effects[0].parameters["delay_s"].clone();
@@ -188,15 +192,18 @@ fn of_two_drives_only_what_has_changed_is_told() {
 }
 
 #[test]
-fn other_tires_since_the_drive_before_are_told_first() {
+fn less_grip_since_the_drive_before_is_named_though_no_tires_were_given() {
     let small = CarParameters::by_name("f1tenth").unwrap();
     let vehicle = nominal(&small);
-    let [before, slippery] = [(&[][..], 41), (&["grip_scale=0.75"], 42)]
-        .map(|(effects, seed)| drive_at(&small, effects, 1.0, DURATION_S, seed).unwrap());
+    let [before, slippery] = [(&[][..], 1.0, 41), (&["grip_scale=-0.25"], 0.7, 42)]
+        .map(|(effects, pace, seed)| drive_at(&small, effects, pace, DURATION_S, seed).unwrap());
     let earlier = Earlier::diagnosed(&Request::new(&before, &vehicle), &mut |_| {}).unwrap();
+    assert!(earlier.diagnosis.invisible.iter().any(|i| i.name == "grip_scale"));
     let request = Request { earlier: Some(&earlier), ..Request::new(&slippery, &vehicle) };
     let d = diagnose(&request, &mut |_| {}).unwrap();
-    assert!(d.changes[0].name == "tires" && d.changes[0].probability > 0.9, "{}", text(&d));
+    assert_eq!(named(&d), ["grip_scale"], "{}", text(&d));
+    let m = &d.effects[0].parameters["m"];
+    assert!(m.low < -0.25 && m.high > -0.25, "{m:?}");
 }
 
 #[test]

@@ -246,6 +246,20 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn a_recording_without_a_channel_is_the_same_in_the_others() {
+        let whole = recording(12);
+        let kept: Vec<Channel> = whole.channels.iter().copied().filter(|c| *c != Channel::YawRate).collect();
+        let part = whole.with_channels(&kept);
+        assert_eq!(part.channels, kept);
+        assert!(kept.len() + 1 == whole.channels.len());
+        for (c, channel) in part.channels.iter().enumerate() {
+            let own = whole.channels.iter().position(|of| of == channel).unwrap();
+            assert_eq!((part.sigma[c], part.weights[c]), (whole.sigma[own], whole.weights[own]));
+            assert_eq!(part.runs[0].measured[c], whole.runs[0].measured[own]);
+        }
+    }
+
+    #[test]
     fn null_values_leave_the_nominal_model() {
         let recording = recording(4);
         let vehicle = VehicleParameters::f1tenth();

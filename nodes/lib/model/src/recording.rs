@@ -261,6 +261,20 @@ impl Recording {
         })
     }
 
+    /// The same without the channels that are not in `kept`.
+    #[must_use]
+    pub fn with_channels(&self, kept: &[Channel]) -> Self {
+        let places: Vec<usize> =
+            (0..self.channels.len()).filter(|c| kept.contains(&self.channels[*c])).collect();
+        let only = |values: &[f64]| places.iter().map(|&c| values[c]).collect();
+        let mut out = Self { sigma: only(&self.sigma), weights: only(&self.weights), ..self.clone() };
+        out.channels = places.iter().map(|&c| self.channels[c]).collect();
+        for (run, own) in out.runs.iter_mut().zip(&self.runs) {
+            run.measured = places.iter().map(|&c| own.measured[c].clone()).collect();
+        }
+        out
+    }
+
     /// Whether the steering is a command; see [`Run::steering_is_held`].
     #[must_use]
     pub fn steering_is_held(&self) -> bool {

@@ -72,6 +72,7 @@ fn diagnosis() -> Diagnosis {
             site: "steering",
             name: "other",
             parameter: None,
+            at_slip_rad: None,
             difference: EffectParameter {
                 value: f64::NAN,
                 low: f64::NAN,
@@ -322,6 +323,25 @@ fn each_site_is_told_with_its_mechanisms_their_sizes_and_what_remains() {
     let quiet = Diagnosis { sites: Vec::new(), changes: Vec::new(), ..diagnosis() };
     assert!(gap_text(&quiet, None, &[]).contains("nothing is the matter"));
     assert!(page(&diagnosis()).contains("Where something is the matter"));
+}
+
+#[test]
+fn other_tires_are_told_by_what_an_axle_gives_at_a_slip() {
+    let mut d = diagnosis();
+    let difference =
+        EffectParameter { value: -0.055, low: -0.07, high: -0.04, unit: "1", before: Some(0.556) };
+    d.changes = vec![Change {
+        site: "rear_axle",
+        name: "tires",
+        parameter: Some("force_over_load"),
+        at_slip_rad: Some(0.0733),
+        difference,
+        probability: 0.97,
+    }];
+    let text = gap_text(&d, None, &[]);
+    let line = text.lines().find(|l| l.starts_with("changes")).unwrap();
+    assert!(line.contains("F_y/F_z of the rear axle at 4.2 deg of slip has changed by"), "{line}");
+    assert!(line.contains("−0.0550") && line.contains("from 0.556: 97 %"), "{line}");
 }
 
 #[test]

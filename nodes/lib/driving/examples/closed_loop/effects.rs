@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::time::Instant;
 
 use anyhow::Result;
-use gripsight_diagnosis::{Request, diagnose};
+use gripsight_diagnosis::{Diagnosis, Earlier, Request, Verdict, diagnose};
 use gripsight_driving::{Named, Trial};
 use gripsight_identification::Usable;
 use gripsight_reference_car::{CarParameters, EffectSetting, SensorSample};
@@ -14,6 +14,7 @@ use gripsight_vehicle::{PacejkaParameters, VehicleParameters};
 use serde::{Deserialize, Serialize};
 
 use crate::drive::Loop;
+use crate::learner::take_identified;
 use crate::run::Case;
 use crate::store::{Store, mean, parts};
 use crate::{Arguments, plant};
@@ -174,6 +175,12 @@ pub(crate) struct Recent {
     samples: VecDeque<TelemetrySample>,
 }
 
+impl Default for Recent {
+    fn default() -> Self {
+        Self { aligner: Aligner::new(AlignConfig::default()), samples: VecDeque::new() }
+    }
+}
+
 impl Recent {
     pub(crate) fn push(&mut self, sample: &SensorSample) -> Result<()> {
         self.aligner.push(sample.measurement(1_000_000_000))?;
@@ -187,13 +194,46 @@ impl Recent {
         Ok(())
     }
 
-    /// What a diagnosis from the tires in use names, and its words for it.
-    fn diagnose(&self, vehicle: &VehicleParameters, tires: PacejkaParameters) -> Result<(Named, String)> {
+    fn sequence(&self) -> Result<StateSequence> {
         let samples: Vec<TelemetrySample> = self.samples.iter().cloned().collect();
-        let sequence = StateSequence::from_samples(&samples)?;
-        let usable = Usable::measured_or_estimated(&sequence, vehicle)?;
-        let request = Request { tires: Some(tires), ..Request::new(&usable.sequence, vehicle) };
-        let diagnosis = diagnose(&request, &mut |_| {})?;
+        Ok(StateSequence::from_samples(&samples)?)
+    }
+
+    /// What later telemetry is compared with.
+    fn as_earlier(&self, vehicle: &VehicleParameters) -> Result<Earlier> {
+        let usable = Usable::measured_or_estimated(&self.sequence()?, vehicle)?;
+        Ok(Earlier::diagnosed(&Request::new(&usable.sequence, vehicle), &mut |_| {})?)
+    }
+
+    /// What a diagnosis from the tires in use names; where none of it is of use, what one says has changed since a drive before.
+    fn diagnose(
+        &self,
+        vehicle: &VehicleParameters,
+        tires: PacejkaParameters,
+        earlier: &Earlier,
+    ) -> Result<Found> {
+        let usable = Usable::measured_or_estimated(&self.sequence()?, vehicle)?;
+        let request = Request::new(&usable.sequence, vehicle);
+        let alone = Found::of(&diagnose(&Request { tires: Some(tires), ..request.clone() }, &mut |_| {})?);
+        if alone.named != Named::default() {
+            return Ok(alone);
+        }
+        let since = Found::of(&diagnose(&Request { earlier: Some(earlier), ..request }, &mut |_| {})?);
+        Ok(Found { words: format!("{}; since before: {}", alone.words, since.words), ..since })
+    }
+}
+
+/// What a diagnosis says, as far as a controller has a use for it.
+#[derive(Debug)]
+struct Found {
+    named: Named,
+    /// Whether the tires are others, and nothing else is: then a set is in use that is of them no more.
+    other_tires: bool,
+    words: String,
+}
+
+impl Found {
+    fn of(diagnosis: &Diagnosis) -> Self {
         let (mut named, mut words) = (Named::default(), vec![diagnosis.verdict.name().to_owned()]);
         for effect in diagnosis.effects.iter().filter(|e| e.accepted) {
             let value = |name: &str| effect.parameters.get(name).map(|p| p.value);
@@ -202,17 +242,49 @@ impl Recent {
             let sizes = sizes.collect::<String>();
             words.push(format!("{}{sizes}{}", effect.name, if used { "" } else { " (no use)" }));
         }
-        Ok((named, words.join(" ")))
+        for (change, slip_rad) in diagnosis.changes.iter().filter_map(|c| Some((c, c.at_slip_rad?))) {
+            let d = &change.difference;
+            words.push(format!(
+                "{} {:.3} of {:.3} at {slip_rad:.3} rad",
+                change.site,
+                d.value,
+                d.before.unwrap_or(f64::NAN)
+            ));
+        }
+        let other_tires = diagnosis.verdict == Verdict::TireRetuneOnly && !diagnosis.changes.is_empty();
+        Self { named, other_tires, words: words.join(" ") }
     }
+}
+
+/// A drive before the car had the effect, at the same pace.
+fn before(case: &Case) -> Result<Earlier> {
+    let case = Case { seed: case.seed + 1000, ..case.clone() };
+    let mut run = Loop::paced(&case, case.tires, &[], PACE, false)?;
+    run.recent = Some(Recent::default());
+    while run.sim.time_s() < WINDOW_S {
+        run.look()?;
+    }
+    let recent = run.recent.take().unwrap_or_default();
+    recent.as_earlier(&run.vehicle)
+}
+
+/// What was said at the end of a lap, and what became of it.
+#[derive(Debug, Clone, Default)]
+struct Said {
+    words: String,
+    trial: Option<Trial>,
+    /// Whether the driver drives with it from now on.
+    taken: bool,
 }
 
 fn drive(case: &Case, wrong: Wrong, knows: Knows, verbose: bool) -> Result<Vec<Row>> {
     let begin = Instant::now();
+    let earlier = if knows == Knows::Diagnosed { Some(before(case)?) } else { None };
     let small = case.car.name == "f1tenth";
     let settings = wrong.settings(small).into_iter().map(|(name, value)| EffectSetting::new(name, &[value]));
     let settings = settings.collect::<Result<Vec<_>, _>>()?;
     let mut run = Loop::paced(case, case.tires, &settings, PACE, verbose)?;
-    run.recent = Some(Recent { aligner: Aligner::new(AlignConfig::default()), samples: VecDeque::new() });
+    run.recent = Some(Recent::default());
     match knows {
         Knows::Told => run.driver.tell(wrong.named(small)),
         Knows::WrongBelieved => run.driver.tell(wrong.another().named(small)),
@@ -226,28 +298,35 @@ fn drive(case: &Case, wrong: Wrong, knows: Knows, verbose: bool) -> Result<Vec<R
             wreck = wreck.or(Some("too slow"));
         }
         while said.len() < run.referee.laps.len() {
-            let mut line: (String, Option<Trial>) = (String::new(), None);
+            let mut line = Said::default();
             if said.len() + 1 >= FIRST {
-                let named = match (knows, &run.recent) {
-                    (Knows::Diagnosed, Some(recent)) => match recent.diagnose(&run.vehicle, case.tires.tires)
-                    {
-                        Ok((named, words)) => {
-                            line.0 = words;
-                            Some(named)
+                let named = match (knows, &run.recent, &earlier) {
+                    (Knows::Diagnosed, Some(recent), Some(earlier)) => {
+                        match recent.diagnose(&run.vehicle, case.tires.tires, earlier) {
+                            Ok(found) => {
+                                line.words = found.words;
+                                if found.other_tires {
+                                    let sequence = recent.sequence()?;
+                                    line.taken =
+                                        take_identified(&mut run.driver, &run.vehicle, &sequence, verbose);
+                                }
+                                Some(found.named)
+                            }
+                            Err(error) => {
+                                line.words = format!("{error:#}");
+                                None
+                            }
                         }
-                        Err(error) => {
-                            line.0 = format!("{error:#}");
-                            None
-                        }
-                    },
-                    (Knows::WrongName, _) => {
-                        line.0 = wrong.another().name().to_owned();
+                    }
+                    (Knows::WrongName, ..) => {
+                        line.words = wrong.another().name().to_owned();
                         Some(wrong.another().named(small))
                     }
                     _ => None,
                 };
                 let new = named.filter(|named| named != run.driver.named());
-                line.1 = new.and_then(|named| run.driver.take_named(named));
+                line.trial = new.and_then(|named| run.driver.take_named(named));
+                line.taken |= line.trial.is_some_and(|trial| trial.taken);
             }
             if verbose {
                 eprintln!("{} {} lap {}: {line:?}", wrong.name(), knows.name(), said.len() + 1);
@@ -259,7 +338,8 @@ fn drive(case: &Case, wrong: Wrong, knows: Knows, verbose: bool) -> Result<Vec<R
     let laps = &run.referee.laps;
     let row = |number: usize| {
         let lap = laps.get(number.wrapping_sub(1)).copied().unwrap_or_default();
-        let (named, trial) = said.get(number.wrapping_sub(1)).cloned().unwrap_or_default();
+        let Said { words: named, trial, taken } =
+            said.get(number.wrapping_sub(1)).cloned().unwrap_or_default();
         Row {
             car: case.car.name.clone(),
             track: case.track.clone(),
@@ -274,7 +354,7 @@ fn drive(case: &Case, wrong: Wrong, knows: Knows, verbose: bool) -> Result<Vec<R
             exits: lap.exits,
             named,
             ratio: trial.map(|t| parts(t.ratio, 1e3)),
-            taken: trial.is_some_and(|t| t.taken),
+            taken,
             wreck: if number == laps.len() { wreck.unwrap_or("").to_owned() } else { String::new() },
             run_seconds,
         }

@@ -53,7 +53,7 @@ impl Learner {
             in_use: None,
             watch: None,
             withdrawn_ns: None,
-            config: Config { residual: ResidualKind::None, ..Config::default() },
+            config: config(),
             due_s: WINDOW_S.1,
             promised: None,
             looks: 0,
@@ -148,6 +148,27 @@ impl Learner {
         }
         Ok(())
     }
+}
+
+/// Identifies from telemetry alone, without anything of before, and hands the set to the driver; whether it was taken.
+pub(crate) fn take_identified(
+    driver: &mut Driver,
+    vehicle: &VehicleParameters,
+    sequence: &StateSequence,
+    verbose: bool,
+) -> bool {
+    let Ok(outcome) = identify(sequence, vehicle, None, None, &config(), &mut |_| {}) else { return false };
+    let trust = match outcome.status {
+        Status::Accepted => Trust::Accepted,
+        Status::AcceptedWithin => Trust::AcceptedWithin,
+        _ => return false,
+    };
+    take(driver, &outcome, &outcome.phi_p, trust, verbose).is_some()
+}
+
+/// The robust method without the residual network, as in every window here.
+fn config() -> Config {
+    Config { residual: ResidualKind::None, ..Config::default() }
 }
 
 /// What the message says of the drive train.

@@ -135,6 +135,9 @@ pub(super) fn change_words(change: &Change) -> String {
 fn differing(change: &Change, verb: &str) -> String {
     let what = if change.name == "other" {
         format!("something with {} that the library lacks", place(change.site))
+    } else if let Some(slip_rad) = change.at_slip_rad {
+        // Tires, by the force of an axle over its load.
+        format!("F_y/F_z of {} at {} deg of slip", place(change.site), significant(slip_rad.to_degrees(), 2))
     } else {
         // Which of several parameters, where the effect has more than one.
         let of_several = EffectId::by_name(change.name).is_some_and(|e| e.sizing() > 1);
@@ -144,7 +147,9 @@ fn differing(change: &Change, verb: &str) -> String {
     };
     let d = &change.difference;
     let size = if d.value.is_finite() {
-        format!(" by {} ({}){}", significant(d.value, 3), interval(d.low, d.high), unit(d.unit))
+        let from = d.before.filter(|_| change.at_slip_rad.is_some());
+        let from = from.map_or_else(String::new, |before| format!(" from {}", significant(before, 3)));
+        format!(" by {} ({}){}{from}", significant(d.value, 3), interval(d.low, d.high), unit(d.unit))
     } else {
         String::new()
     };
