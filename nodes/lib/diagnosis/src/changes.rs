@@ -18,6 +18,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::decisions;
 use crate::engine::Engine;
+use crate::frame::of_other_tires;
 
 use crate::answer::Change;
 use crate::between::Between;
@@ -119,7 +120,9 @@ pub(crate) fn compare(
         let covariance = other.covariance().select_rows(&columns).select_columns(&columns);
         let before: Vec<f64> = (0..TIRES).map(|c| earlier.values[c] + other.step[c]).collect();
         let by = other.step.rows(n, TIRES);
-        let size = engine.size(&EffectId::GripScale.spec().parameters[0]);
+        // The share of grip that matters.
+        let sizes = of_other_tires().map(|e| engine.size(&e.spec().parameters[0]));
+        let size = sizes.fold(0.0, f64::max);
         ForceChange::of_axles(size, [&before, by.as_slice()], &covariance, slip_rad)
     };
     Some(Compared { selection, by, dispersion, terms: earlier.terms.len(), tires })

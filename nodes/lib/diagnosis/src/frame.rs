@@ -7,6 +7,11 @@ use crate::infer::FIRST;
 use crate::inferred::Inferred;
 use crate::sizes::Sizes;
 
+/// The effects that are other tires, where nobody knows those from before.
+pub(crate) fn of_other_tires() -> impl Iterator<Item = EffectId> {
+    EffectId::candidates().filter(|e| e.spec().needs.contains(&Need::ReferenceTires))
+}
+
 /// What both drives are linearised with.
 #[derive(Debug, Clone)]
 pub(crate) struct Frame {
@@ -30,10 +35,8 @@ impl Frame {
         considered: impl Fn(EffectId) -> bool,
     ) -> Self {
         let own = &earlier.columns;
-        let of_tires = |e: &EffectId| e.spec().needs.contains(&Need::ReferenceTires);
-        let more: Vec<EffectId> = EffectId::candidates()
-            .filter(|e| of_tires(e) && !own.effects.contains(e) && considered(*e))
-            .collect();
+        let more: Vec<EffectId> =
+            of_other_tires().filter(|e| !own.effects.contains(e) && considered(*e)).collect();
         let columns = Columns::new([&own.effects[..], &more].concat(), own.flexible.clone());
         let open = own.effects.iter().copied().filter(|e| earlier.is_open(*e));
         let library = open.chain(more.iter().copied()).collect();

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::fmt::Write as _;
 use std::time::Instant;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use gripsight_diagnosis::{Diagnosis, Earlier, Request, Verdict, diagnose};
 use gripsight_driving::{Named, Trial};
 use gripsight_identification::Usable;
@@ -262,7 +262,9 @@ fn before(case: &Case) -> Result<Earlier> {
     let mut run = Loop::paced(&case, case.tires, &[], PACE, false)?;
     run.recent = Some(Recent::default());
     while run.sim.time_s() < WINDOW_S {
-        run.look()?;
+        if let Some(reason) = run.look()? {
+            bail!("the drive before the effect ended: {reason}");
+        }
     }
     let recent = run.recent.take().unwrap_or_default();
     recent.as_earlier(&run.vehicle)
