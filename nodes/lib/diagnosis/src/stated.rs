@@ -217,7 +217,9 @@ impl Asked<'_, '_, '_, '_> {
     fn lacking(&self, from: &Tried, part: &[usize]) -> Option<Tried> {
         let mut chosen = from.chosen.clone();
         part.iter().for_each(|&i| chosen[i] = 0);
-        let near = self.look(chosen.clone(), from, f64::NEG_INFINITY);
+        // What does as well without the part, as any part must be worth its odds, needs no better fit.
+        let needless = from.cost + 2.0 * self.around.dispersion * -self.log_odds(0.0, 0.0);
+        let near = self.look(chosen.clone(), from, needless);
         // Worse than with no effect at all: too far away for a look.
         near.filter(|n| n.cost <= self.worst).or_else(|| self.fitted(chosen, from.place()))
     }
@@ -339,7 +341,9 @@ impl Asked<'_, '_, '_, '_> {
             let offered = self.offered(&now, with);
             let looks: Vec<(usize, Tried)> = offered
                 .into_par_iter()
-                .filter_map(|i| Some((i, self.look(with(i), &now, now.cost)?)))
+                .filter_map(|i| {
+                    Some((i, self.look(with(i), &now, now.cost / (1.0 - decisions::LEAST_CLOSED))?))
+                })
                 .collect();
             let costs: Vec<(usize, f64)> = looks.iter().map(|(i, look)| (*i, look.cost)).collect();
             let likely = |cost: f64| self.log_odds(now.cost, cost) > 0.0;

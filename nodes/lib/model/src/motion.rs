@@ -6,7 +6,7 @@
 use crate::rollout::Window;
 use gripsight_vehicle::{OwnTires, Real};
 
-use crate::effects::Lagging;
+use crate::effects::{EffectId, Lagging};
 use crate::flexible::Push;
 use crate::longitudinal_force::{Following, force_before_mps2};
 use crate::model::ExtendedModel;
@@ -20,6 +20,8 @@ const MIN_SPEED_MPS: f64 = 0.2;
 pub(crate) struct Mover<'m, 'a, T> {
     model: &'m ExtendedModel<'a>,
     p: &'m [T],
+    /// Its effects with their parameters.
+    effects: Vec<(EffectId, &'m [T])>,
     car: &'m Car<T>,
     axles_at_rest: Axles<T>,
     tires: OwnTires<T>,
@@ -126,6 +128,7 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         Self {
             model,
             p,
+            effects: model.with_parameters(p).collect(),
             car,
             axles_at_rest: car.axles_at_rest(),
             tires,
@@ -355,10 +358,10 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
             place_rad: now.place_rad,
         };
         let mut axles = self.axles_at_rest;
-        for (effect, values) in model.with_parameters(self.p) {
+        for (effect, values) in &self.effects {
             effect.loads(values, car, &at, &mut axles);
         }
-        for (effect, values) in model.with_parameters(self.p) {
+        for (effect, values) in &self.effects {
             effect.grip(values, car, &at, &mut axles);
         }
         let front_rad = now.steering_rad + axles.front.steer_rad;
@@ -394,7 +397,7 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         let front_n = front_use * axles.front.carried_n(self.axles_at_rest.front.load_n);
         let rear_n = rear_use * axles.rear.carried_n(self.axles_at_rest.rear.load_n);
         let mut motion = Motion::none();
-        for (effect, values) in model.with_parameters(self.p) {
+        for (effect, values) in &self.effects {
             effect.motion(values, car, &at, &mut motion);
         }
         let commanded = model.recording.has_command;

@@ -88,13 +88,15 @@ impl<T: Real> Car<T> {
 
     /// The axles at rest.
     pub fn axles_at_rest(&self) -> Axles<T> {
-        let weight_n = self.mass_kg * GRAVITY_MPS2;
         let axle =
             |load_n| Axle { load_n, steer_rad: T::from(0.0), grip: T::from(1.0), usable: T::from(1.0) };
-        Axles {
-            front: axle(weight_n * self.l_r_m / self.wheelbase_m()),
-            rear: axle(weight_n * self.l_f_m / self.wheelbase_m()),
-        }
+        let rear_n = self.mass_kg * GRAVITY_MPS2 * self.l_f_m / self.wheelbase_m();
+        Axles { front: axle(self.front_load_at_rest_n()), rear: axle(rear_n) }
+    }
+
+    /// Load of the front axle at rest.
+    pub fn front_load_at_rest_n(&self) -> T {
+        self.mass_kg * GRAVITY_MPS2 * self.l_r_m / self.wheelbase_m()
     }
 
     /// Share of the longitudinal force at the front axle.

@@ -30,7 +30,7 @@ impl Effect for OuterWheelMoment {
     };
 
     fn motion<T: Real>(p: &[T], car: &Car<T>, at: &Moment<T>, motion: &mut Motion<T>) {
-        let front_n = at.front_use * car.axles_at_rest().front.load_n;
+        let front_n = at.front_use * car.front_load_at_rest_n();
         let lever_m = p[0] * at.rolled_a_y_mps2 / GRAVITY_MPS2;
         motion.yaw_radps2 -= front_n * at.steering_rad.sin_cos().0 * lever_m / car.turned_kgm2();
     }
