@@ -11,7 +11,7 @@
 
 use nalgebra::DVector;
 
-use crate::around::{Around, Pruned};
+use crate::around::Around;
 use crate::budget::Scorer;
 use crate::columns::Columns;
 use crate::engine::Engine;
@@ -20,6 +20,7 @@ use crate::frame::Frame;
 use crate::hypotheses::terms;
 use crate::inferred::Inferred;
 use crate::joint::{Joint, Weighed};
+use crate::pruned::Pruned;
 use crate::sizes::{Sizes, told};
 use crate::state::State;
 use crate::stated::{Fits, Stated};

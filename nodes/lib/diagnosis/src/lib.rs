@@ -55,6 +55,7 @@ mod plausible;
 mod posterior;
 mod predictive;
 mod priors;
+mod pruned;
 mod residual;
 mod sizes;
 mod state;
