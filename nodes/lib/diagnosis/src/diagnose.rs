@@ -131,7 +131,7 @@ pub(crate) fn explain(
         (None, Some(tires)) => (tires, TireTrust::file()),
         (None, None) => (fit_tires(&recording, request.vehicle, &windows.training)?, TireTrust::free()),
     };
-    let (library, invisible) = library(request, &recording, trust != TireTrust::free())?;
+    let (library, invisible) = library(request, &recording, trust.knows_the_peak())?;
     let mut engine = Engine::new(&recording, request.vehicle, tires, trust);
     if let Some(model) = request.given_model() {
         (engine.held, engine.usual) = model.parameters()?;
@@ -298,7 +298,7 @@ pub(crate) fn fit_tires(
 pub(crate) fn library(
     request: &Request<'_>,
     recording: &Recording,
-    trusted: bool,
+    peak_is_known: bool,
 ) -> Result<(Vec<EffectId>, Vec<Invisible>), GapError> {
     for name in request.without.iter().chain(request.only) {
         EffectId::known(name)?;
@@ -310,7 +310,7 @@ pub(crate) fn library(
         Need::Passes => {
             recording.laps.laps >= 1.5 || (recording.laps.lap_m > 0.0 && request.held_out.is_some())
         }
-        Need::ReferenceTires => trusted,
+        Need::ReferenceTires => peak_is_known,
     };
     let mut library = Vec::new();
     let mut invisible = Vec::new();

@@ -1,7 +1,7 @@
 //! The hypotheses: every effect and every flexible term, there or not, with the prior of its size in either case.
 
 use gripsight_estimation::selection::{ColumnPrior, Term};
-use gripsight_model::{EffectId, HOLD, Site, TIRES};
+use gripsight_model::{EffectId, HOLD, Site};
 
 use crate::columns::Columns;
 use crate::decisions;
@@ -16,15 +16,12 @@ pub(crate) fn terms(
     library: &[EffectId],
 ) -> Vec<Term> {
     let mean = engine.nominal.to_parameters();
-    let trust = &engine.trust;
-    let tires = (0..TIRES)
-        .map(|j| {
-            let sigma = match j % 4 {
-                0 => trust.stiffness * mean[j],
-                1 => trust.shape,
-                2 => trust.peak * mean[j],
-                _ => trust.curvature,
-            };
+    let tires = engine
+        .trust
+        .sigmas(&mean)
+        .into_iter()
+        .enumerate()
+        .map(|(j, (sigma, _))| {
             let [low, high] = TIRE_BOUNDS[j % 4];
             ColumnPrior {
                 offset: mean[j] - values[j],

@@ -22,9 +22,11 @@ use crate::{GapError, Request};
 /// Names of a tire's parameters, in the order of the fit.
 const TIRE: [&str; 4] = ["stiffness", "c", "d", "e"];
 const AXLES: [&str; 2] = ["front", "rear"];
+/// Status of an identification whose drive reached the peak.
+const PEAK_REACHED: &str = "accepted";
 
 /// Fits the car's own tires to a drive. `start`: effective tires that the drive has given, which are near, or none: then from several. `status` and `vehicle_hash` of the
-/// identification that they go along with.
+/// identification that they go along with: where it is not `accepted` the drive did not reach the peak, and the covariance says that nothing is known of it.
 ///
 /// # Errors
 /// [`GapError`] where the drive cannot tell, or the fit does not end at finite numbers.
@@ -73,7 +75,15 @@ pub fn own_tires(
     };
     // Tires and what every car has; how long a command is held is nobody's to inherit.
     let used: Vec<usize> = (0..TIRES).chain(BASE..columns.first_flexible()).collect();
-    let covariance = own_covariance(&around, &weighed, &used).ok_or(GapError::NotFinite)?;
+    let mut covariance = own_covariance(&around, &weighed, &used).ok_or(GapError::NotFinite)?;
+    if status != PEAK_REACHED {
+        // What the fit says of slips that were not driven is the formula's, not the tires'; and a peak in the wrong place takes the stiffness along.
+        let formula = TireTrust { stiffness: TireTrust::file().stiffness, ..TireTrust::free() };
+        let mean = std::array::from_fn(|j| values[j]);
+        for (j, (sigma, _)) in formula.sigmas(&mean).into_iter().enumerate() {
+            covariance[j][j] += sigma * sigma;
+        }
+    }
     let mut parameters = PosteriorParameter::of_tires(&OwnTires::from_parameters(&values[..TIRES]));
     for &effect in &columns.effects {
         parameters.extend(effect.spec().parameters.iter().map(|p| PosteriorParameter {
@@ -104,8 +114,8 @@ pub(crate) fn usual(posterior: &TirePosterior) -> Result<Sized, GapError> {
 
 /// How far the tires are trusted on another drive: as well as this one knows them, and no better than tires stay the same.
 pub(crate) fn trust(posterior: &TirePosterior) -> Result<TireTrust, GapError> {
-    let [least, most] = [TireTrust::drive(), TireTrust::free()];
-    let mut trust = least;
+    let most = TireTrust::free();
+    let mut trust = TireTrust::drive();
     for axle in AXLES {
         let mut at = [0; 4];
         for (place, p) in at.iter_mut().zip(TIRE) {
@@ -183,6 +193,9 @@ mod tests {
         approx::assert_relative_eq!(trust(&of).unwrap().stiffness, 0.1, epsilon = 1e-12);
         of.covariance.iter_mut().flatten().for_each(|c| *c = 0.0);
         assert_eq!(trust(&of).unwrap(), TireTrust::drive());
+        // A peak that nothing is known of is none to tell another grip from.
+        of.covariance[2][2] = 1.0;
+        assert!(!trust(&of).unwrap().knows_the_peak());
     }
 
     #[test]

@@ -1,10 +1,9 @@
 //! What is known beforehand: bounds and priors of all parameters.
 
 use gripsight_estimation::shooting::{Parameter, Prior};
-use gripsight_model::{EffectId, HOLD, TIRES};
+use gripsight_model::{EffectId, HOLD};
 
 use crate::engine::Engine;
-use crate::trust::TireTrust;
 
 /// Bounds of (B C D, C, D, E).
 pub(crate) const TIRE_BOUNDS: [[f64; 2]; 4] = [[1.5, 80.0], [1.0, 2.3], [0.1, 3.0], [-4.0, 0.98]];
@@ -32,24 +31,17 @@ impl Engine<'_> {
         ridge: f64,
     ) -> Vec<Parameter> {
         let mean = self.nominal.to_parameters();
-        let trust = &self.trust;
-        let tighter = if self.trust == TireTrust::free() { 1.0 } else { RESIDUALS_PER_OBSERVATION.sqrt() };
-        let mut out: Vec<Parameter> = (0..TIRES)
-            .map(|j| {
+        // What is known of a tire argues against errors that are all alike; what only makes the fit well posed is as it is.
+        let tighter = |known: bool| if known { RESIDUALS_PER_OBSERVATION.sqrt() } else { 1.0 };
+        let mut out: Vec<Parameter> = self
+            .trust
+            .sigmas(&mean)
+            .into_iter()
+            .enumerate()
+            .map(|(j, (sigma, known))| {
                 let [low, high] = TIRE_BOUNDS[j % 4];
-                let sigma = match j % 4 {
-                    0 => trust.stiffness * mean[j],
-                    1 => trust.shape,
-                    2 => trust.peak * mean[j],
-                    _ => trust.curvature,
-                };
-                Parameter {
-                    start: values[j],
-                    low,
-                    high,
-                    free: true,
-                    prior: Some(Prior { mean: mean[j], sigma: sigma / tighter }),
-                }
+                let prior = Some(Prior { mean: mean[j], sigma: sigma / tighter(known) });
+                Parameter { start: values[j], low, high, free: true, prior }
             })
             .collect();
         let dt_s = self.recording.dt_s();

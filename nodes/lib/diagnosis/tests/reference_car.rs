@@ -288,9 +288,23 @@ fn a_car_s_own_tires_cost_no_name_on_their_own_drive_and_show_grip_on_another() 
     // On the drive that they were fitted on they say nothing of grip; on another they do.
     let invisible = |d: &Diagnosis| d.invisible.iter().any(|i| i.name == "grip_scale");
     assert!(invisible(&of(&recording, &posterior)));
-    let clean =
-        own_tires(&drive(&car, &[], DURATION_S, 32).unwrap(), &vehicle, None, ("accepted", "0")).unwrap();
+    let before = drive(&car, &[], DURATION_S, 32).unwrap();
+    let own = |status| own_tires(&before, &vehicle, None, (status, "0")).unwrap();
+    let clean = own("accepted");
     let later = of(&drive(&car, &lag, DURATION_S, 33).unwrap(), &clean);
     assert!(!invisible(&later));
     assert_eq!(named(&later)[0], "steering_lag", "{}", text(&later));
+    // Of a peak that the drive did not reach nothing is known, however well the formula fits, and the stiffness as well as from a file at best.
+    let within = own("accepted_within");
+    let relative_sigma = |name: &str| {
+        let place = within.place(name).unwrap();
+        within.covariance[place][place].sqrt() / within.parameters[place].mean
+    };
+    assert!(relative_sigma("front.d") >= 0.4 && relative_sigma("rear.d") >= 0.4);
+    assert!(
+        (0.05..0.1).contains(&relative_sigma("front.stiffness")),
+        "{}",
+        relative_sigma("front.stiffness")
+    );
+    assert_eq!(within.parameters, clean.parameters);
 }

@@ -42,7 +42,7 @@ impl Need {
                 "no pose over at least one and a half laps is recorded, and no second drive is held out"
             }
             Self::ReferenceTires => {
-                "with the tires free it is the same as other tires: give --pacejka or a reference bag"
+                "with the tires' peak unknown it is the same as other tires: give --pacejka or a reference bag"
             }
         }
     }
