@@ -16,6 +16,7 @@ const DEFINITIONS: &[(&str, &str)] = definitions! {
         "Excitation"
         "ExtendedModel"
         "FrictionPrior"
+        "GapChange"
         "GapEffect"
         "GapParameter"
         "GapRegion"

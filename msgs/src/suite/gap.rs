@@ -41,6 +41,29 @@ impl Message for GapEffect {
     const TYPE: &'static str = "gripsight_msgs/msg/GapEffect";
 }
 
+/// What differs between a drive and one from before of the same car.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GapChange {
+    /// As in the table of sites.
+    pub site: String,
+    /// The effect; `tires`; or `other` for what no effect of the library does.
+    pub name: String,
+    /// What of it differs; empty of `other`.
+    pub parameter: String,
+    /// Slip angle at which tires' forces are compared (rad); NaN of anything else.
+    pub at_slip_rad: f64,
+    /// The later drive less the earlier one (unit).
+    pub difference: Interval,
+    /// Its SI unit.
+    pub unit: String,
+    /// Probability that it has changed, 0 to 1.
+    pub probability: f64,
+}
+
+impl Message for GapChange {
+    const TYPE: &'static str = "gripsight_msgs/msg/GapChange";
+}
+
 /// One bin of an axis along which the gap was looked at.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GapRegion {
@@ -76,6 +99,8 @@ pub struct GapReport {
     pub verdict: String,
     /// Ranked, the most likely first.
     pub effects: Vec<GapEffect>,
+    /// Since the first sequence, the likeliest first; empty unless asked for.
+    pub changes: Vec<GapChange>,
     /// Effects that these signals cannot show.
     pub invisible: Vec<String>,
     /// The bins with the largest share, largest first.

@@ -11,7 +11,7 @@ mod tires;
 
 pub use common::{Handshake, Interval, Range};
 pub use friction::FrictionPrior;
-pub use gap::{ExtendedModel, GapEffect, GapParameter, GapRegion, GapReport};
+pub use gap::{ExtendedModel, GapChange, GapEffect, GapParameter, GapRegion, GapReport};
 pub use longitudinal::{Longitudinal, LongitudinalLimit};
 pub use progress::{DriveNext, IdentificationProgress};
 pub use residual::{Residual, ResidualModel};

@@ -1,19 +1,22 @@
 //! A diagnosis as a message: the summary of gap.json.
 
 use gripsight_bag::encode;
-use gripsight_diagnosis::{Diagnosis, Place, RankedEffect};
+use gripsight_diagnosis::{Change, Diagnosis, Place, RankedEffect};
 use gripsight_estimation::Estimate;
 use gripsight_msgs::standard::std_msgs::Header;
 use gripsight_msgs::{
-    ExtendedModel, GapEffect, GapParameter, GapRegion, GapReport, Handshake, Interval, MagicFormula,
+    ExtendedModel, GapChange, GapEffect, GapParameter, GapRegion, GapReport, Handshake, Interval,
+    MagicFormula,
 };
 use gripsight_signals::{DataHealth, StateSequence};
 
 /// Bins of the message at most; the files have all.
 const MOST_REGIONS: usize = 12;
 
+/// `since`: the drive compared with the first one, where that is asked for.
 pub(crate) fn report(
     diagnosis: &Diagnosis,
+    since: Option<&Diagnosis>,
     sequence: &StateSequence,
     vehicle_hash: &str,
     report_directory: String,
@@ -29,6 +32,7 @@ pub(crate) fn report(
         },
         verdict: diagnosis.verdict.name().to_owned(),
         effects: diagnosis.effects.iter().map(effect).collect(),
+        changes: since.map_or_else(Vec::new, |d| d.changes.iter().map(change).collect()),
         invisible: diagnosis.invisible.iter().map(|i| i.name.to_owned()).collect(),
         regions: regions(diagnosis),
         gap_nominal: interval(&gap.nominal),
@@ -77,6 +81,19 @@ fn effect(effect: &RankedEffect) -> GapEffect {
         gap_closed_fraction: interval(&effect.gap_closed_fraction),
         confidence: effect.confidence,
         confused_with: effect.confused_with.iter().map(|&name| name.to_owned()).collect(),
+    }
+}
+
+fn change(change: &Change) -> GapChange {
+    let difference = &change.difference;
+    GapChange {
+        site: change.site.to_owned(),
+        name: change.name.to_owned(),
+        parameter: change.parameter.unwrap_or_default().to_owned(),
+        at_slip_rad: change.at_slip_rad.unwrap_or(f64::NAN),
+        difference: Interval { value: difference.value, low: difference.low, high: difference.high },
+        unit: difference.unit.to_owned(),
+        probability: change.probability,
     }
 }
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use gripsight_bag::Reassembler;
-use gripsight_diagnosis::{Diagnosis, Request, diagnose};
+use gripsight_diagnosis::{Diagnosis, Earlier, GapError, Request, diagnose};
 use gripsight_identification::export::stamp_text;
 use gripsight_identification::{Usable, vehicle_hash};
 use gripsight_identification_messages as messages;
@@ -44,6 +44,11 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
         Vec::<String>::new(),
         Descriptor::new("Effects to leave out of the library, by name"),
     )?;
+    let compare_with_first = node.parameter(
+        "compare_with_first",
+        false,
+        Descriptor::new("Whether every sequence is compared with the first one that can tell, too"),
+    )?;
     let sequences = node.subscription::<SequenceMessage>("sequence", Qos::latched().with_depth(64))?;
     let tires = node.subscription::<PosteriorMessage>("posterior", Qos::latched())?;
     let output = node.publisher::<GapReport>("~/report", Qos::latched())?;
@@ -60,7 +65,17 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
         });
         let (newest, sequence) = watch::channel(None);
         let (known, tires_known) = watch::channel(None);
-        let diagnoser = Diagnoser { vehicle, report_folder, without, output, model, facts: &facts };
+        let first = RefCell::new(None);
+        let diagnoser = Diagnoser {
+            vehicle,
+            report_folder,
+            without,
+            compare_with_first,
+            first,
+            output,
+            model,
+            facts: &facts,
+        };
         tokio::select! {
             () = collect_sequences(sequences, newest, &facts) => {}
             () = collect_tires(tires, known, &diagnoser.vehicle, &facts) => {}
@@ -118,10 +133,22 @@ async fn say(diagnostics: &Diagnostics, facts: &RefCell<Facts>) {
     }
 }
 
+/// What is said of a sequence.
+struct Said {
+    diagnosis: Diagnosis,
+    /// Compared with the first one.
+    since: Option<Diagnosis>,
+    /// That first one, or this where it is.
+    first: Option<Arc<Earlier>>,
+}
+
 struct Diagnoser<'a> {
     vehicle: Arc<VehicleParameters>,
     report_folder: Parameter<String>,
     without: Parameter<Vec<String>>,
+    compare_with_first: Parameter<bool>,
+    /// The first sequence that could tell, since comparing was asked for.
+    first: RefCell<Option<Arc<Earlier>>>,
     output: Publisher<GapReport>,
     model: Publisher<ExtendedModel>,
     facts: &'a RefCell<Facts>,
@@ -142,7 +169,7 @@ impl Diagnoser<'_> {
             let known = tires.borrow().clone();
             let result = self.diagnose(Arc::clone(&sequence), known).await;
             let mut last = match result {
-                Ok(diagnosis) => self.publish(&diagnosis, &sequence).await,
+                Ok(said) => self.publish(said, &sequence).await,
                 Err(reason) => Last::Failed { reason },
             };
             if let Last::Failed { reason } = &mut last {
@@ -159,9 +186,12 @@ impl Diagnoser<'_> {
         &self,
         sequence: Arc<StateSequence>,
         posterior: Option<Arc<TirePosterior>>,
-    ) -> Result<Diagnosis, String> {
+    ) -> Result<Said, String> {
         let (vehicle, without) = (Arc::clone(&self.vehicle), self.without.get());
-        let work = move || -> anyhow::Result<Diagnosis> {
+        let compares = self.compare_with_first.get();
+        // Who no longer asks, and asks again, begins anew.
+        let first = self.first.borrow().clone().filter(|_| compares);
+        let work = move || -> anyhow::Result<Said> {
             // As offline: what nothing measures is estimated; what contradicts itself stays, to be named.
             let usable = Usable::measured_or_estimated(&sequence, &vehicle)?;
             let request = Request {
@@ -169,7 +199,7 @@ impl Diagnoser<'_> {
                 without: &without,
                 ..Request::new(&usable.sequence, &vehicle)
             };
-            Ok(diagnose(&request, &mut |step| tracing::debug!("{step}"))?)
+            said(&request, first, compares)
         };
         match tokio::task::spawn_blocking(work).await {
             Ok(result) => result.map_err(|error| format!("{error:#}")),
@@ -177,7 +207,8 @@ impl Diagnoser<'_> {
         }
     }
 
-    async fn publish(&self, diagnosis: &Diagnosis, sequence: &StateSequence) -> Last {
+    async fn publish(&self, said: Said, sequence: &StateSequence) -> Last {
+        let Said { diagnosis, since, first } = said;
         let hash = vehicle_hash(&self.vehicle);
         let folder = self.report_folder.get();
         let written = if folder.is_empty() {
@@ -192,8 +223,10 @@ impl Diagnoser<'_> {
                 seed: None,
                 command: "gap_diagnosis".to_owned(),
             };
-            report::write(&PathBuf::from(folder), diagnosis, &header, sequence.sequence_id)
+            let folder = PathBuf::from(folder);
+            report::write(&folder, &diagnosis, since.as_ref(), &header, sequence.sequence_id)
         };
+        *self.first.borrow_mut() = first;
         let directory = match written {
             Ok(directory) => directory.display().to_string(),
             Err(error) => {
@@ -201,11 +234,37 @@ impl Diagnoser<'_> {
                 String::new()
             }
         };
-        let report = message::report(diagnosis, sequence, &hash, directory);
+        let report = message::report(&diagnosis, since.as_ref(), sequence, &hash, directory);
         self.output.publish(&report).await;
-        self.model.publish(&message::extended_model(diagnosis, &report)).await;
+        self.model.publish(&message::extended_model(&diagnosis, &report)).await;
         let because = diagnosis.reasons.first().cloned().unwrap_or_default();
         tracing::info!("sequence {}: {}: {because}", sequence.sequence_id, diagnosis.verdict.name());
         Last::Done { verdict: diagnosis.verdict.name(), because }
     }
+}
+
+/// Diagnoses a sequence, and compares it with the first one; where there is none yet, it may be the one.
+fn said(request: &Request<'_>, first: Option<Arc<Earlier>>, compares: bool) -> anyhow::Result<Said> {
+    let progress = &mut |step: &str| tracing::debug!("{step}");
+    if compares && first.is_none() {
+        match Earlier::diagnosed(request, progress) {
+            Ok(first) => {
+                let diagnosis = first.diagnosis.clone();
+                return Ok(Said { diagnosis, since: None, first: Some(Arc::new(first)) });
+            }
+            // It cannot tell: what it lacks is said below, and the next one may be the first.
+            Err(GapError::Earlier(_)) => {}
+            Err(error) => return Err(error.into()),
+        }
+    }
+    let diagnosis = diagnose(request, progress)?;
+    let since = first.as_deref().map(|first| {
+        // Tires from elsewhere are not asked for: the first sequence's own are what this one's are compared with.
+        diagnose(&Request { earlier: Some(first), posterior: None, ..request.clone() }, progress)
+    });
+    let since = since.transpose().unwrap_or_else(|error| {
+        tracing::warn!("not compared with the first sequence: {error}");
+        None
+    });
+    Ok(Said { diagnosis, since, first })
 }

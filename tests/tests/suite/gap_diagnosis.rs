@@ -5,7 +5,7 @@ use std::time::Duration;
 use gripsight_msgs::{GapReport, Message, StateSequence, TirePosterior};
 use gripsight_tests::domain::Domain;
 use gripsight_tests::peers::{available, cyclone, start_cyclone};
-use gripsight_tests::process::node;
+use gripsight_tests::process::{Process, node};
 use serde_json::{Value, json};
 
 use super::identification::{play, simulate};
@@ -39,7 +39,8 @@ fn a_moving_window_of_a_replayed_drive_is_diagnosed_within_bounds() {
     let sequences = listen("/telemetry/sequence", StateSequence::TYPE);
     let posterior = listen("/identifier/posterior", TirePosterior::TYPE);
     let joined = ["-r", "sequence:=telemetry/sequence", "-r", "posterior:=identifier/posterior"];
-    let diagnosis = node(&domain, "gap_diagnosis", &[&joined[..], &vehicle[..]].concat());
+    let compare = ["-p", "compare_with_first:=true"];
+    let diagnosis = node(&domain, "gap_diagnosis", &[&joined[..], &compare[..], &vehicle[..]].concat());
     let joined = ["-r", "sequence:=telemetry/sequence", "-r", "model:=s4_residual/model"];
     let _identifier = node(&domain, "identifier", &[&joined[..], &vehicle[..]].concat());
     let joined = ["-r", "sequence:=telemetry/sequence", "-r", "candidate:=identifier/candidate"];
@@ -60,19 +61,28 @@ fn a_moving_window_of_a_replayed_drive_is_diagnosed_within_bounds() {
     pause(true);
 
     // Python writes NaN ("not stated") and Infinity (no limit), which are no JSON.
-    let report = || {
-        let line = reports.line(RUN).replace("NaN", "null").replace("Infinity", "null");
+    let of = |peer: &Process| {
+        let line = peer.line(RUN).replace("NaN", "null").replace("Infinity", "null");
         serde_json::from_str::<Value>(&line.replace("-null", "null")).unwrap()
     };
+    let report = || of(&reports);
     let first = report();
-    posterior.line(RUN);
+    let tires = of(&posterior);
     pause(false);
     let second = report();
     let id = |report: &Value| report["handshake"]["sequence_id"].as_u64().unwrap();
     assert!(id(&first) < id(&second));
-    // A loss of grip shows only against tires that are known.
+    // A loss of grip shows only against tires whose peak is known.
+    let knows_the_peak = tires["status"] == "accepted";
     let hides_grip = |report: &Value| report["invisible"].as_array().unwrap().contains(&"grip_scale".into());
-    assert!(hides_grip(&first) && !hides_grip(&second), "{} {}", first["invisible"], second["invisible"]);
+    assert!(hides_grip(&first), "{}", first["invisible"]);
+    assert_eq!(hides_grip(&second), !knows_the_peak, "{} {}", tires["status"], second["invisible"]);
+    // The second window is compared with the first, and it is the same car.
+    let changes = |report: &Value| report["changes"].as_array().unwrap().clone();
+    assert!(changes(&first).is_empty() && !changes(&second).is_empty(), "{second}");
+    for change in changes(&second) {
+        assert!(change["probability"].as_f64().unwrap() < 0.5, "{change}");
+    }
     for report in [&first, &second] {
         let named = &report["effects"][0];
         assert_eq!((&named["name"], &named["accepted"]), (&EFFECT.into(), &true.into()), "{report}");
