@@ -14,5 +14,8 @@ shift
 case $out in -*) ;; /*) ;; *) out=$PWD/$out ;; esac
 cd "$(dirname "$0")/.."
 
-cargo build --locked -p gripsight_driving --example closed_loop
-exec "${CARGO_TARGET_DIR:-target}/debug/examples/closed_loop" "$out" "$@"
+# What takes minutes runs with the build that the tests share; what takes an hour is worth one of its own.
+profile=release
+for option; do [[ $option == --quick ]] && profile=dev; done
+cargo build --locked --profile "$profile" -p gripsight_driving --example closed_loop
+exec "${CARGO_TARGET_DIR:-target}/${profile/dev/debug}/examples/closed_loop" "$out" "$@"
