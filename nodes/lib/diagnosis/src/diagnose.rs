@@ -99,12 +99,10 @@ const FINAL_ITERATIONS: usize = 15;
 pub fn diagnose(request: &Request<'_>, progress: &mut dyn FnMut(&str)) -> Result<Diagnosis, GapError> {
     let data_health = DataHealth::of(request.sequence)?;
     match usable(request, &data_health) {
-        Ok(usable) => {
-            let (diagnosis, _) = explain(request, usable, data_health, progress)?;
-            let Some(together) = &request.together else { return Ok(diagnosis) };
-            let contradicts = drives::contradictions(together, request, progress)?;
-            drives::of_one_state(diagnosis, contradicts, together, request, progress)
-        }
+        Ok(usable) => match &request.together {
+            Some(together) => drives::of_one_state(together, request, usable, data_health, progress),
+            None => Ok(explain(request, usable, data_health, progress)?.0),
+        },
         Err(error) if cannot_tell(&error) => Ok(refused(request, &error, data_health)),
         Err(error) => Err(error),
     }

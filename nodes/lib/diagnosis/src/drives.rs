@@ -57,7 +57,7 @@ pub(crate) fn errors(
             interval(&by_block(recording, &windows, &score))
         };
         DriveAnswer {
-            name: format!("drive {}", number + 1),
+            name: name(number),
             duration_s: span[1] - span[0],
             retuned: error(null),
             after: error(model),
@@ -83,7 +83,7 @@ type Differing = Vec<Option<Vec<Change>>>;
 
 /// What differs in each drive from the drive that most of them agree with: what drives in unlike states give together is the state of none, and
 /// lacks so much that anything agrees with it.
-pub(crate) fn contradictions(
+fn contradictions(
     together: &Together<'_>,
     request: &Request<'_>,
     progress: &mut dyn FnMut(&str),
@@ -109,22 +109,24 @@ pub(crate) fn contradictions(
     Ok(most)
 }
 
-/// The diagnosis of all drives where they agree, else of those that do.
+/// The diagnosis of all drives where they agree, else of those that do. `usable`, `data_health`: of all of them.
 pub(crate) fn of_one_state(
-    mut all: Diagnosis,
-    differing: Differing,
     together: &Together<'_>,
     request: &Request<'_>,
+    usable_of_all: Usable,
+    data_health: DataHealth,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Diagnosis, GapError> {
+    let differing = contradictions(together, request, progress)?;
     let one_state: Vec<usize> = (differing.iter().enumerate())
         .filter(|(_, c)| c.as_ref().is_some_and(Vec::is_empty))
         .map(|(i, _)| i)
         .collect();
     let agree = differing.iter().flatten().all(Vec::is_empty);
-    all.drives.iter_mut().zip(differing).for_each(|(d, c)| d.contradicts = c);
     if agree || one_state.is_empty() {
-        return Ok(all);
+        let (mut diagnosis, _) = explain(request, usable_of_all, data_health, progress)?;
+        diagnosis.drives.iter_mut().zip(differing).for_each(|(d, c)| d.contradicts = c);
+        return Ok(diagnosis);
     }
     let alone: Vec<StateSequence> = one_state.iter().map(|&i| together.alone[i].clone()).collect();
     let joined = Joined::of(&alone)?;
@@ -137,20 +139,33 @@ pub(crate) fn of_one_state(
     let health = DataHealth::of(part.sequence)?;
     let (mut diagnosis, _) = explain(&part, usable(&part, &health)?, health, progress)?;
     let explained = std::mem::take(&mut diagnosis.drives);
-    for drive in &mut all.drives {
-        (drive.retuned, drive.after) = (Estimate::UNKNOWN, Estimate::UNKNOWN);
-    }
-    for (&i, own) in one_state.iter().zip(explained) {
-        (all.drives[i].retuned, all.drives[i].after) = (own.retuned, own.after);
-    }
+    let spans = together.spans_s.iter().enumerate();
+    diagnosis.drives = spans
+        .zip(differing)
+        .map(|((number, span), contradicts)| {
+            let place = one_state.iter().position(|&i| i == number);
+            let own = place.and_then(|place| explained.get(place));
+            DriveAnswer {
+                name: name(number),
+                duration_s: span[1] - span[0],
+                retuned: own.map_or(Estimate::UNKNOWN, |own| own.retuned),
+                after: own.map_or(Estimate::UNKNOWN, |own| own.after),
+                contradicts,
+            }
+        })
+        .collect();
     let apart = if one_state.len() > 1 {
         "the drives are not in one state: only those that agree with each other are explained"
     } else {
         "no two of the drives are in one state: one of them is explained, and the others are held against it"
     };
     diagnosis.reasons.insert(0, apart.to_owned());
-    diagnosis.drives = all.drives;
     Ok(diagnosis)
+}
+
+/// What a drive is called.
+fn name(number: usize) -> String {
+    format!("drive {}", number + 1)
 }
 
 /// What differs in each drive from the drive `number`.
