@@ -249,6 +249,8 @@ fn said(request: &Request<'_>, first: Option<Arc<Earlier>>, compares: bool) -> a
     if compares && first.is_none() {
         match Earlier::diagnosed(request, progress) {
             Ok(first) => {
+                let id = request.sequence.sequence_id;
+                tracing::info!("sequence {id}: what later ones are compared with");
                 let diagnosis = first.diagnosis.clone();
                 return Ok(Said { diagnosis, since: None, first: Some(Arc::new(first)) });
             }

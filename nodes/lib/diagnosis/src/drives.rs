@@ -109,7 +109,7 @@ fn contradictions(
     Ok(most)
 }
 
-/// The diagnosis of all drives where they agree, else of those that do. `usable`, `data_health`: of all of them.
+/// The diagnosis of all drives where they agree, else of those that do. `usable_of_all`, `data_health`: of all of them, joined.
 pub(crate) fn of_one_state(
     together: &Together<'_>,
     request: &Request<'_>,

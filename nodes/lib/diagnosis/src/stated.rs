@@ -166,7 +166,7 @@ impl Asked<'_, '_, '_, '_> {
 
     /// Logarithm of the odds that an effect matters, from what is left without it and with it.
     fn log_odds(&self, simpler: f64, fuller: f64) -> f64 {
-        (decisions::PRIOR / (1.0 - decisions::PRIOR)).ln() + self.log_ratio(simpler, fuller)
+        prior_log_odds() + self.log_ratio(simpler, fuller)
     }
 
     /// The same of an effect of the model, by term, as [`of_an_effect`] weighs it.
@@ -217,8 +217,8 @@ impl Asked<'_, '_, '_, '_> {
     fn lacking(&self, from: &Tried, part: &[usize]) -> Option<Tried> {
         let mut chosen = from.chosen.clone();
         part.iter().for_each(|&i| chosen[i] = 0);
-        // What does as well without the part, as any part must be worth its odds, needs no better fit.
-        let needless = from.cost + 2.0 * self.around.dispersion * -self.log_odds(0.0, 0.0);
+        // Below this cost the part is not worth the odds against it, and a better fit without it would say the same.
+        let needless = from.cost - 2.0 * self.around.dispersion * prior_log_odds();
         let near = self.look(chosen.clone(), from, needless);
         // Worse than with no effect at all: too far away for a look.
         near.filter(|n| n.cost <= self.worst).or_else(|| self.fitted(chosen, from.place()))
@@ -339,11 +339,10 @@ impl Asked<'_, '_, '_, '_> {
                 fuller
             };
             let offered = self.offered(&now, with);
+            let astray = now.cost / (1.0 - decisions::LEAST_CLOSED);
             let looks: Vec<(usize, Tried)> = offered
                 .into_par_iter()
-                .filter_map(|i| {
-                    Some((i, self.look(with(i), &now, now.cost / (1.0 - decisions::LEAST_CLOSED))?))
-                })
+                .filter_map(|i| Some((i, self.look(with(i), &now, astray)?)))
                 .collect();
             let costs: Vec<(usize, f64)> = looks.iter().map(|(i, look)| (*i, look.cost)).collect();
             let likely = |cost: f64| self.log_odds(now.cost, cost) > 0.0;
@@ -426,6 +425,11 @@ impl Asked<'_, '_, '_, '_> {
         }
         (now, out)
     }
+}
+
+/// Logarithm of the odds that an effect matters, before the data are looked at.
+fn prior_log_odds() -> f64 {
+    (decisions::PRIOR / (1.0 - decisions::PRIOR)).ln()
 }
 
 /// Logarithm of the odds that an effect of a model matters which closes a share of what is left without it. One whose derivative vanishes where it is absent has no

@@ -45,7 +45,7 @@ pub struct TirePosterior {
     pub vehicle_hash: String,
     /// The parameters.
     pub parameters: Vec<PosteriorParameter>,
-    /// Their covariance.
+    /// Their covariance. Of a peak that the drive did not reach it is as wide as without any drive: what a fit says there is the formula's.
     pub covariance: Vec<Vec<f64>>,
     /// Hashes of the seconds of driving that it was fitted on: on these it is a place to start from, never a prior.
     pub data: Vec<String>,
