@@ -82,8 +82,7 @@ pub fn linearize<M: Rollout>(
         .map(|(window, start)| {
             // The number of derivatives is fixed at compile time; take the smallest that holds them all.
             match free.len() + 2 {
-                0..=2 => part::<M, 2>(problem, &free, parameters, *start, window),
-                3..=4 => part::<M, 4>(problem, &free, parameters, *start, window),
+                0..=4 => part::<M, 4>(problem, &free, parameters, *start, window),
                 5..=8 => part::<M, 8>(problem, &free, parameters, *start, window),
                 9..=12 => part::<M, 12>(problem, &free, parameters, *start, window),
                 13..=16 => part::<M, 16>(problem, &free, parameters, *start, window),
@@ -91,11 +90,8 @@ pub fn linearize<M: Rollout>(
                 21..=24 => part::<M, 24>(problem, &free, parameters, *start, window),
                 25..=28 => part::<M, 28>(problem, &free, parameters, *start, window),
                 29..=32 => part::<M, 32>(problem, &free, parameters, *start, window),
-                33..=36 => part::<M, 36>(problem, &free, parameters, *start, window),
-                37..=40 => part::<M, 40>(problem, &free, parameters, *start, window),
-                41..=48 => part::<M, 48>(problem, &free, parameters, *start, window),
-                49..=80 => part::<M, 80>(problem, &free, parameters, *start, window),
-                _ => in_passes::<M, 80>(problem, &free, parameters, *start, window),
+                33..=40 => part::<M, 40>(problem, &free, parameters, *start, window),
+                _ => in_passes::<M, 40>(problem, &free, parameters, *start, window),
             }
         })
         .collect();
