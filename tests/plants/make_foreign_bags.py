@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 """Drives two plants that this project did not write, and records them as ROS 2 bags with their true tire forces.
 
-Plants: `slipx` (1:10 double track with relaxation, load sensitivity, combined slip, servo) and the 29-state multibody car
-of `commonroad-vehicle-models` (Ford Escort, BMW 320i). Packages: nodes/lib/reference_car/compare/requirements.txt.
+Plants: `slipx` (1:10 double track with relaxation, load sensitivity, combined slip, servo; its own car and one of 1:8), the 29-state
+multibody car of `commonroad-vehicle-models` (Ford Escort, BMW 320i, VW Vanagon) and its single-track drift model (Ford Escort, BMW 320i).
+Packages: nodes/lib/reference_car/compare/requirements.txt.
 
     make_foreign_bags.py OUT [--only NAME ...] [--duration S]
-    make_foreign_bags.py OUT --draw N --seed S [--duration S]
+    make_foreign_bags.py OUT --draw N --seed S [--plants PLANT ...] [--duration S]
 
-For every drive NAME of the table at the end, or for N drives whose plant, track, friction and pace are drawn (for
+For every drive NAME of the table at the end, or for N drives of the plants named in turn whose track, friction and pace are drawn (for
 `gripsight withheld make --foreign OUT`): OUT/NAME/NAME.mcap (nav_msgs/Odometry, ackermann_msgs/AckermannDriveStamped,
 sensor_msgs/Imu, 100 Hz), OUT/NAME/truth_axle_forces.csv (at the odometry's stamps), OUT/NAME/vehicle.yaml, and
 OUT/NAME/about.json with the effects that the plant contains by its equations. Same packages, same bytes.
@@ -27,9 +28,12 @@ import slipx
 import vehiclemodels.utils.tire_model as tire_model
 import vehiclemodels.vehicle_dynamics_mb as multibody
 from mcap_ros2.writer import Writer
+import vehiclemodels.vehicle_dynamics_std as single_track_drift
 from vehiclemodels.init_mb import init_mb
+from vehiclemodels.init_std import init_std
 from vehiclemodels.parameters_vehicle1 import parameters_vehicle1
 from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
+from vehiclemodels.parameters_vehicle3 import parameters_vehicle3
 
 G = 9.81
 STEP_S = 1e-3
@@ -114,8 +118,12 @@ class Slipx:
     # It brakes and drives with the rear axle alone.
     a_x_share = 0.2
 
+    @staticmethod
+    def figures():
+        return slipx.load_reference_car().params
+
     def __init__(self, mu):
-        p = slipx.load_reference_car().params
+        p = self.figures()
         for tire in (p.tyre_front, p.tyre_rear):
             ratio = tire.mu_x0 / tire.mu_y0
             tire.mu_y0, tire.mu_x0 = mu, mu * ratio
@@ -123,7 +131,7 @@ class Slipx:
             mass_kg=p.mass, yaw_inertia_kgm2=p.izz, l_f_m=p.lf, l_r_m=p.lr, h_cg_m=p.h_cog, track_width_m=p.track_front,
             drive_front_share=0.0, brake_front_share=0.0,
         )
-        self.wheelbase_m, self.top_mps = p.lf + p.lr, 12.0
+        self.wheelbase_m, self.top_mps, self.wheel_radius_m = p.lf + p.lr, 12.0, p.wheel_radius
         self.model = slipx.VehicleModel.create(slipx.Tier.L2_DoubleTrack, p)
         self.state, self.seen = slipx.VehicleState(), slipx.StepDiagnostics()
         self.command = (0.0, 0.0)
@@ -132,7 +140,7 @@ class Slipx:
         self.state.pos = slipx.Vec3(x, y, 0.0)
         self.state.yaw = heading
         self.state.vel_body = slipx.Vec3(v, 0.0, 0.0)
-        self.state.omega_w = [v / 0.05] * 4
+        self.state.omega_w = [v / self.wheel_radius_m] * 4
 
     def pose(self):
         s = self.state
@@ -155,6 +163,21 @@ class Slipx:
 
     def steering(self):
         return self.command[0]
+
+
+class Buggy(Slipx):
+    """The same equations for a 1:8 car that nothing was developed on: heavier, its weight behind, softer tires that relax over a longer way."""
+
+    @staticmethod
+    def figures():
+        p = slipx.load_reference_car().params
+        p.mass, p.izz, p.h_cog = 5.4, 0.118, 0.085
+        p.lf, p.lr, p.track_front, p.track_rear = 0.215, 0.165, 0.30, 0.30
+        p.wheel_radius, p.torque_stall, p.steer_bandwidth = 0.058, 3.6, 32.0
+        p.c_alpha_f, p.c_alpha_r = 430.0, 610.0
+        for tire in (p.tyre_front, p.tyre_rear):
+            tire.relax_length, tire.shape_c, tire.k_mu = 0.12, 1.45, 0.1
+        return p
 
 
 class Multibody:
@@ -220,6 +243,47 @@ class Multibody:
 
     def steering(self):
         return self.x[2]
+
+
+class Drift(Multibody):
+    """The single-track model with wheels that slip lengthwise, of the same figures: no roll, and no lateral transfer of load."""
+
+    contained = ["combined_slip", "longitudinal_load_transfer", "mass_error"]
+
+    def __init__(self, parameters, mu):
+        super().__init__(parameters, mu)
+        self.vehicle["h_cg_m"] = self.p.h_s
+
+    def place(self, x, y, heading, v):
+        self.x = np.array(init_std([x, y, 0.0, v, heading, 0.0, 0.0], self.p))
+
+    def pose(self):
+        v, slip = self.x[3], self.x[6]
+        return self.x[0], self.x[1], self.x[4], v * math.cos(slip), v * math.sin(slip), self.x[5]
+
+    def rates(self, x):
+        rate = (self.wanted - x[2]) / 0.05
+        return np.array(single_track_drift.vehicle_dynamics_std(list(x), [rate, self.acceleration], self.p))
+
+    def truth(self):
+        seen = []
+
+        def watched(kappa, alpha, gamma, mu_y, f_z, f0_y, p):
+            f_y = self.tires(kappa, alpha, gamma, mu_y, f_z, f0_y, p)
+            seen.append((f_y, f_z))
+            return f_y
+
+        tire_model.formula_lateral_comb = watched
+        f = self.rates(self.x)
+        tire_model.formula_lateral_comb = self.tires
+        (front, z_front), (rear, z_rear) = seen
+        v, slip = self.x[3], self.x[6]
+        turning = f[6] + self.x[5]
+        return dict(
+            f_y_front_n=front, f_y_rear_n=rear, f_z_front_n=z_front, f_z_rear_n=z_rear, f_z_least_n=min(z_front, z_rear),
+            steering_rad=self.x[2], a_x_mps2=f[3] * math.cos(slip) - v * turning * math.sin(slip),
+            a_y_mps2=f[3] * math.sin(slip) + v * turning * math.cos(slip),
+        )
 
 
 HEADER = "std_msgs/Header header\n"
@@ -342,7 +406,17 @@ def record(out, name, plant, track_name, reverse, mu, pace, seed, duration_s, di
     print(f"{name}: F_y/F_z up to {use[0]:.2f} front, {use[1]:.2f} rear; off the line by {worst:.1f} wheelbases")
 
 
-ford, bmw = parameters_vehicle1, parameters_vehicle2
+ford, bmw, vanagon = parameters_vehicle1, parameters_vehicle2, parameters_vehicle3
+# What is drawn from: the plant, its friction and pace from and to, steering dither (rad).
+PLANTS = {
+    "slipx": (Slipx, (0.7, 1.1), (0.72, 0.84), 0.02),
+    "bmw": (lambda mu: Multibody(bmw, mu), (0.55, 0.95), (0.70, 0.80), 0.004),
+    "ford": (lambda mu: Multibody(ford, mu), (0.55, 0.95), (0.70, 0.80), 0.004),
+    "buggy": (Buggy, (0.7, 1.1), (0.72, 0.84), 0.02),
+    "vanagon": (lambda mu: Multibody(vanagon, mu), (0.55, 0.95), (0.70, 0.80), 0.004),
+    "drift_bmw": (lambda mu: Drift(bmw, mu), (0.55, 0.95), (0.70, 0.80), 0.004),
+    "drift_ford": (lambda mu: Drift(ford, mu), (0.55, 0.95), (0.70, 0.80), 0.004),
+}
 # name, plant, track, reverse, mu, pace, seed, steering dither (rad). Those named test_ are looked at for published figures only.
 DRIVES = [
     ("slipx_mu08", lambda: Slipx(0.8), "kidney", False, 0.8, 0.85, 11, 0.02),
@@ -360,21 +434,17 @@ DRIVES = [
 ]
 
 
-def drawn(number, seed):
-    """Rows as in DRIVES: every second one slipx, the others the two passenger cars in turn."""
+def drawn(number, seed, plants):
+    """Rows as in DRIVES, of the plants in turn."""
     rng = np.random.default_rng(seed)
     rows = []
     for place in range(number):
-        kind = ("slipx", "bmw", "slipx", "ford")[place % 4]
-        mu = float(rng.uniform(0.7, 1.1) if kind == "slipx" else rng.uniform(0.55, 0.95))
-        build = {
-            "slipx": lambda mu=mu: Slipx(mu),
-            "bmw": lambda mu=mu: Multibody(bmw, mu),
-            "ford": lambda mu=mu: Multibody(ford, mu),
-        }[kind]
+        kind = plants[place % len(plants)]
+        plant, frictions, paces, dither = PLANTS[kind]
+        mu = float(rng.uniform(*frictions))
         track = str(rng.choice(list(TRACKS)))
-        pace = float(rng.uniform(0.72, 0.84) if kind == "slipx" else rng.uniform(0.70, 0.80))
-        dither = 0.02 if kind == "slipx" else 0.004
+        pace = float(rng.uniform(*paces))
+        build = lambda plant=plant, mu=mu: plant(mu)
         rows.append((f"{kind}_{place:02d}", build, track, bool(rng.integers(2)), mu, pace, int(rng.integers(2**31)), dither))
     return rows
 
@@ -397,10 +467,11 @@ def main():
     parser.add_argument("--only", nargs="+", choices=[d[0] for d in DRIVES])
     parser.add_argument("--draw", type=int, metavar="N", help="draw N drives instead of the table's")
     parser.add_argument("--seed", type=int, default=1, help="seed of the draw")
+    parser.add_argument("--plants", nargs="+", choices=PLANTS, default=["slipx", "bmw", "slipx", "ford"], help="what the draw takes in turn")
     parser.add_argument("--duration", type=float, default=40.0)
     arguments = parser.parse_args()
     if arguments.draw is not None:
-        for row in drawn(arguments.draw, arguments.seed):
+        for row in drawn(arguments.draw, arguments.seed, arguments.plants):
             drive_slower(arguments.out, row, arguments.duration)
         return
     for name, plant, track, reverse, mu, pace, seed, dither in DRIVES:
