@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Two programs on the same cases: what each names, case by case, and their rates side by side with Wilson intervals and McNemar's exact test.
 
-    paired.py OUT.csv LABELS VERDICTS OTHER [LABELS VERDICTS OTHER ...]
+    paired.py OUT.csv LABELS VERDICTS OTHER [LABELS VERDICTS OTHER ...]      OTHER may be "-": one program alone
 
 LABELS of `gripsight withheld make`, VERDICTS and OTHER of `gripsight withheld diagnose` by the one program and the other. A program from before `track_width_m`
 reads vehicle files without that line only; a batch copied without it keeps its labels. Cases that either has no verdict of are left out, and counted.
@@ -40,8 +40,8 @@ def collected(batches):
     rows, missing = [], 0
     for labels, *verdicts in batches:
         for case in json.loads(Path(labels).read_text())["cases"]:
-            paths = [Path(v) / case["case"] / "gap.json" for v in verdicts]
-            if not all(p.exists() for p in paths):
+            paths = [Path(v) / case["case"] / "gap.json" if v != "-" else None for v in verdicts]
+            if not all(p is None or p.exists() for p in paths):
                 missing += 1
                 continue
             effects = case["effects"]
@@ -50,7 +50,7 @@ def collected(batches):
             row += [" ".join(e["name"] for e in effects), " ".join("" if s is None else f"{s:.1f}" for s in severity)]
             row += [case["race_pace"], " ".join(case["without"]), " ".join(case["contained"])]
             for path in paths:
-                verdict, names, inside, total = said(path, effects)
+                verdict, names, inside, total = said(path, effects) if path else ("", [], 0, 0)
                 row += [verdict, " ".join(names), inside, total]
             rows.append(dict(zip(HEAD, row, strict=True)))
     return rows, missing
@@ -76,7 +76,10 @@ def mcnemar(pairs):
 def line(what, rows, right):
     pairs = [(right(r, ""), right(r, "_other")) for r in rows]
     rates = [wilson(sum(p[i] for p in pairs), len(pairs)) for i in (0, 1)]
-    print(f"| {what} | {rates[0]} | {rates[1]} | {mcnemar(pairs)} |")
+    if any(r["verdict_other"] for r in rows):
+        print(f"| {what} | {rates[0]} | {rates[1]} | {mcnemar(pairs)} |")
+    else:
+        print(f"| {what} | {rates[0]} | - | - |")
 
 
 def names(row, which):
@@ -117,6 +120,10 @@ def report(rows, family):
     line("not in the library: `none_of_these`", of_kind("out_of_library"), none_of_these)
     line("a name for what is not there: all cases", of, a_wrong_name)
     line("of these without effect", [r for r in of if r["kind"] == "none"], a_wrong_name)
+    plant = lambda row: row["car"].rpartition("_")[0]
+    for name in sorted({plant(r) for r in of}) if family == "foreign" else ():
+        line(f"{name}: one effect, named first", [r for r in of_kind("single") if plant(r) == name], first)
+        line(f"{name}: a name for what is not there", [r for r in of if plant(r) == name], a_wrong_name)
     for which, who in (("", "the one"), ("_other", "the other")):
         inside, total = (sum(int(r[k + which]) for r in of) for k in ("sizes_inside", "sizes"))
         print(f"\nsizes inside, {who}: {wilson(inside, total)}")
@@ -131,7 +138,7 @@ def main():
         writer = csv.DictWriter(file, HEAD, lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
-    print(f"{len(rows)} cases, {missing} without both verdicts")
+    print(f"{len(rows)} cases, {missing} without all verdicts")
     for family in sorted({r["family"] for r in rows}):
         report(rows, family)
 

@@ -193,7 +193,11 @@ pub(crate) fn explain(
         Models { nominal: &nominal, null: &null, state: &model, steps: &steps, candidates: &candidates };
     let budget = Budget::of(&engine, &scorer, &windows, &models);
     let (verdict, mut reasons) = match &differences {
-        Some(differences) => (differences.verdict(), errors(&budget, model.named.is_empty())),
+        Some(differences) => {
+            let mut reasons = errors(&budget, model.named.is_empty());
+            reasons.extend(differences.reason());
+            (differences.verdict(), reasons)
+        }
         None => decide(&budget, &inferred, &library),
     };
     // What cannot be right comes right after the errors: it explains more than any effect.
@@ -204,6 +208,7 @@ pub(crate) fn explain(
     }
     reasons.extend(request.earlier.map(Earlier::text));
     reasons.extend(noise::caveat(&recording));
+    let error_over_earlier = differences.as_ref().map(|d| d.error_over_earlier);
     let effects = match &differences {
         Some(differences) => differences.ranked(&engine, &budget),
         None => ranked(&engine, &inferred, &library, &budget),
@@ -244,7 +249,11 @@ pub(crate) fn explain(
         tires,
         extended_model: ExtendedModelFile::of(&engine, &model),
         data_health,
-        inference: Some(Inference { rounds: inferred.rounds, dispersion: inferred.dispersion }),
+        inference: Some(Inference {
+            rounds: inferred.rounds,
+            dispersion: inferred.dispersion,
+            error_over_earlier,
+        }),
         series,
     };
     Ok((diagnosis, inferred))

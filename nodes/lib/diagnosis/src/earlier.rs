@@ -119,7 +119,8 @@ impl Earlier {
             }
         }
         let Pair { earlier, later, compared, .. } = best;
-        Ok((later, Differences::of(earlier, compared)))
+        let differences = Differences::of(earlier, &later, compared);
+        Ok((later, differences))
     }
 }
 
@@ -184,13 +185,17 @@ pub(crate) struct Differences {
     /// The earlier drive, linearised as the later one is.
     earlier: Inferred,
     compared: Compared,
+    /// Squared error that one model, fitted to either drive, leaves of the later one over that of the earlier one.
+    pub(crate) error_over_earlier: f64,
     pub(crate) changes: Vec<Change>,
     /// The effects that have changed, the likeliest first: likelier than not, and by an amount whose interval holds no zero.
     pub(crate) accepted: Vec<EffectId>,
 }
 
 impl Differences {
-    fn of(earlier: Inferred, compared: Compared) -> Self {
+    fn of(earlier: Inferred, later: &Inferred, compared: Compared) -> Self {
+        let error = |of: &Inferred| of.weighed.cost / of.weighed.residuals;
+        let error_over_earlier = error_over(error(later), error(&earlier));
         let changes = compared.changes(&earlier);
         let stands_out =
             |e: &EffectId| compared.standing_out(&earlier, *e).is_some_and(|(_, told)| told > 1.0);
@@ -201,7 +206,7 @@ impl Differences {
             .filter(stands_out)
             .collect();
         accepted.dedup();
-        Self { earlier, compared, changes, accepted }
+        Self { earlier, compared, error_over_earlier, changes, accepted }
     }
 
     /// The changes that are likelier than not.
@@ -250,13 +255,28 @@ impl Differences {
         all.filter(|e| !self.accepted.contains(e)).collect()
     }
 
+    /// Whether the later drive is out of the reach of what explains the earlier one: contradictions so large let no single change stand out.
+    fn is_out_of_reach(&self) -> bool {
+        self.error_over_earlier > decisions::OUT_OF_REACH
+    }
+
+    /// What the verdict rests on that is no change by itself.
+    pub(crate) fn reason(&self) -> Option<String> {
+        self.is_out_of_reach().then(|| {
+            format!(
+                "the model that explains the drive before leaves {:.0} times its squared error in this one, fitted to it as well: something differs, and so much that no single change stands out",
+                self.error_over_earlier
+            )
+        })
+    }
+
     /// The verdict: effects where some have changed, other tires, something that the library lacks, or nothing.
     pub(crate) fn verdict(&self) -> Verdict {
         let likely =
             |name: &str| self.changes.iter().any(|c| c.name == name && c.probability >= decisions::LIKELY);
         if !self.accepted.is_empty() {
             Verdict::Effects
-        } else if likely("other") {
+        } else if likely("other") || self.is_out_of_reach() {
             Verdict::NoneOfThese
         } else if self.compared.of_tires() >= decisions::LIKELY {
             Verdict::TireRetuneOnly
@@ -264,6 +284,11 @@ impl Differences {
             Verdict::NoGap
         }
     }
+}
+
+/// One squared error over another, both over the noise of the same sensors: below it none tells anything.
+fn error_over(later: f64, earlier: f64) -> f64 {
+    later.max(1.0) / earlier.max(1.0)
 }
 
 /// Says of a listed change what held-out data leave of it.
@@ -296,6 +321,12 @@ mod tests {
         spoken_against(&mut changes, EffectId::GyroBias);
         let left = changes.map(|c| (c.name, c.probability));
         assert_eq!(left, [("tires", 0.6), ("steering_offset", decisions::NEEDLESS), ("gyro_bias", 0.03)]);
+    }
+
+    #[test]
+    fn an_error_below_the_noise_is_as_good_as_the_noise() {
+        let over = [(0.2, 0.9), (6.0, 0.5), (6.0, 2.0)].map(|(later, earlier)| error_over(later, earlier));
+        assert_eq!(over, [1.0, 6.0, 3.0]);
     }
 
     #[test]

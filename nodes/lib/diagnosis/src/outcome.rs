@@ -248,6 +248,9 @@ pub struct Inference {
     pub rounds: usize,
     /// How many times less the errors tell than if they were independent.
     pub dispersion: f64,
+    /// Where two drives are compared: squared error that one model, fitted to either, leaves of the later one over that of the earlier one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_over_earlier: Option<f64>,
 }
 
 /// A diagnosis.
