@@ -252,14 +252,12 @@ impl Asked<'_, '_, '_, '_> {
         let mut now = self.with_effects_for_free_terms(self.without_needless_free_terms(start));
         let mut turns = 0;
         loop {
-            let begun = now.chosen.clone();
             let fuller = self.with_likely_effects(now)?;
             let full = fuller.chosen.clone();
             // What stood in for the effects is no longer needed beside them, and what it kept out may be likely without it.
             let (left, simpler) = self.without_unlikely_effects(self.without_needless_free_terms(fuller));
             turns += 1;
-            // What was taken in and out again would be once more.
-            if left.chosen == full || left.chosen == begun || turns == TURNS {
+            if left.chosen == full || turns == TURNS {
                 return Some((left, simpler));
             }
             now = left;
