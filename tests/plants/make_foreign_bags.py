@@ -223,7 +223,8 @@ class Multibody:
         k4 = self.rates(self.x + STEP_S * k3)
         self.x = self.x + STEP_S / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
 
-    def truth(self):
+    def watched_rates(self):
+        """Rates of the state, and lateral and vertical force of each tire that the plant has."""
         seen = []
 
         def watched(kappa, alpha, gamma, mu_y, f_z, f0_y, p):
@@ -234,7 +235,10 @@ class Multibody:
         tire_model.formula_lateral_comb = watched
         f = self.rates(self.x)
         tire_model.formula_lateral_comb = self.tires
-        (fl, zfl), (fr, zfr), (rl, zrl), (rr, zrr) = seen
+        return f, seen
+
+    def truth(self):
+        f, ((fl, zfl), (fr, zfr), (rl, zrl), (rr, zrr)) = self.watched_rates()
         return dict(
             f_y_front_n=fl + fr, f_y_rear_n=rl + rr, f_z_front_n=zfl + zfr, f_z_rear_n=zrl + zrr,
             f_z_least_n=min(zfl, zfr, zrl, zrr),
@@ -266,17 +270,7 @@ class Drift(Multibody):
         return np.array(single_track_drift.vehicle_dynamics_std(list(x), [rate, self.acceleration], self.p))
 
     def truth(self):
-        seen = []
-
-        def watched(kappa, alpha, gamma, mu_y, f_z, f0_y, p):
-            f_y = self.tires(kappa, alpha, gamma, mu_y, f_z, f0_y, p)
-            seen.append((f_y, f_z))
-            return f_y
-
-        tire_model.formula_lateral_comb = watched
-        f = self.rates(self.x)
-        tire_model.formula_lateral_comb = self.tires
-        (front, z_front), (rear, z_rear) = seen
+        f, ((front, z_front), (rear, z_rear)) = self.watched_rates()
         v, slip = self.x[3], self.x[6]
         turning = f[6] + self.x[5]
         return dict(

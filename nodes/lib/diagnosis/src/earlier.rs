@@ -255,16 +255,16 @@ impl Differences {
         all.filter(|e| !self.accepted.contains(e)).collect()
     }
 
-    /// Whether the later drive is out of the reach of what explains the earlier one: contradictions so large let no single change stand out.
+    /// Whether the later drive is out of the reach of what explains the earlier one, and no effect is said to have changed: contradictions so large let none stand out.
     fn is_out_of_reach(&self) -> bool {
-        self.error_over_earlier > decisions::OUT_OF_REACH
+        self.accepted.is_empty() && self.error_over_earlier > decisions::OUT_OF_REACH
     }
 
     /// What the verdict rests on that is no change by itself.
     pub(crate) fn reason(&self) -> Option<String> {
         self.is_out_of_reach().then(|| {
             format!(
-                "the model that explains the drive before leaves {:.0} times its squared error in this one, fitted to it as well: something differs, and so much that no single change stands out",
+                "the model that explains the drive before leaves {:.0} times its squared error in this one, fitted to it as well: something differs that no change explains",
                 self.error_over_earlier
             )
         })
