@@ -33,6 +33,8 @@ INJECTED = [
     ("v_y_bias", "bias_mps", (0.05, 0.10), (0.10, 0.20)),
     ("v_y_lever_arm", "x_m", (0.05, 0.10), (0.30, 0.60)),
 ]
+# What is put in over what a car has of its own: factors multiply, so the difference is the size times what the car has already.
+FACTORS = {"steering_gain", "gyro_scale"}
 # Which effects do the same to what is recorded (the report says so beside a name).
 ALIKE = [{"steering_delay", "steering_lag"}]
 SITES = {"steering_delay": "steering", "steering_gain": "steering", "gyro_scale": "yaw_rate", "v_y_bias": "v_y", "v_y_lever_arm": "v_y"}
@@ -109,7 +111,8 @@ def judged(kind, effect, size, gap):
     row |= {"others": sum(n not in alike for n in names)}
     if own:
         row |= {"size": difference["value"], "low": difference["low"], "high": difference["high"]}
-        row |= {"inside": difference["low"] <= size <= difference["high"]}
+        differs = size * (1.0 + (difference["before"] if effect in FACTORS else 0.0))
+        row |= {"differs": differs, "inside": difference["low"] <= differs <= difference["high"]}
     return row
 
 

@@ -82,7 +82,7 @@ pub(crate) fn chance(size_over_half_width: f64) -> f64 {
 
 /// Share of an effect that stays unexplained where another one, which does nearly the same and is not among the candidates, is the cause: the lower end of its
 /// 90 % interval by `fit_chance.py` on the cases above, as a wrong name is worse than none.
-const RIVAL_LEAVES: f64 = 0.14;
+pub(crate) const RIVAL_LEAVES: f64 = 0.14;
 
 /// Standard deviations in half the width of a 90 % interval.
 const HALF_WIDTH: f64 = 1.645;

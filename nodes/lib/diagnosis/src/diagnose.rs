@@ -178,7 +178,10 @@ pub(crate) fn explain(
             engine.fit(&named, &values, Some(null.starts.clone()), &windows.training, FINAL_ITERATIONS)
         };
         let steps = Steps::of(&engine, &scorer, &windows, &null, &model);
-        let Some(effect) = steps.refuted(&engine, &scorer, &windows, &model) else {
+        // What falls out of a comparison sample by sample is in the rollouts of one drive.
+        let by_rollouts = differences.as_ref().is_none_or(|d| !d.of_one_motion);
+        let refuted = by_rollouts.then(|| steps.refuted(&engine, &scorer, &windows, &model)).flatten();
+        let Some(effect) = refuted else {
             let candidates = candidates.into_iter().filter(|e| !named.contains(e)).take(CANDIDATES);
             let candidates: Vec<(EffectId, Vec<f64>)> = candidates.map(|e| (e, size(&e))).collect();
             break (model, steps, candidates);

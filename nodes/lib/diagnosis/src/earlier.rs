@@ -8,7 +8,7 @@ use gripsight_vehicle::VehicleParameters;
 
 use crate::answer::Change;
 use crate::budget::Budget;
-use crate::changes::{Compared, compare};
+use crate::changes::{Compared, compare, compare_paired};
 use crate::decisions;
 use crate::diagnose::{SEARCH_WINDOWS, explain};
 use crate::engine::Engine;
@@ -16,6 +16,7 @@ use crate::frame::Frame;
 use crate::infer::linearised;
 use crate::inferred::Inferred;
 use crate::outcome::{Diagnosis, RankedEffect};
+use crate::paired::Paired;
 use crate::sizes::{Sized, reported};
 use crate::tire_change::reached_slip_rad;
 use crate::trust::TireTrust;
@@ -24,6 +25,11 @@ use crate::{ExtendedModelFile, GapError, Request, Verdict};
 
 /// Times at most that a later drive is linearised anew, around what has changed.
 const AROUND_CHANGES: usize = 3;
+
+/// Times at most that two recordings of one motion are linearised.
+const ROUNDS: usize = 8;
+/// Of these the first, in which effects alone are asked for: beside free terms a linearisation far from the cause would blame them.
+const FAR_ROUNDS: usize = 3;
 
 /// A drive from before with its own diagnosis. A later drive is compared with all that was found in it: tires, effects, and what they left.
 #[derive(Debug, Clone)]
@@ -94,6 +100,18 @@ impl Earlier {
         let [front, rear] = reached_slip_rad(&before, &here);
         let [later_front, later_rear] = reached_slip_rad(&after, &there);
         let slip_rad = [front.min(later_front), rear.min(later_rear)];
+        if let Some(paired) = Paired::of(&frame, (&before, &here), (&after, &there)) {
+            progress("the drives are of one motion: comparing them sample by sample");
+            let model = (&frame.values[..], &frame.chosen[..]);
+            let earlier = linearised(&mut before, &frame, model, false, &here).ok_or(GapError::NotFinite)?;
+            let earlier = Inferred { chosen: frame.chosen.clone(), sizes: frame.sizes.clone(), ..earlier };
+            let (compared, model) =
+                of_one_motion(&paired, &before, &earlier, slip_rad).ok_or(GapError::NotFinite)?;
+            let later = linearised(&mut after, &frame, (&model.0, &model.1), true, &there);
+            let later = later.ok_or(GapError::NotFinite)?;
+            let differences = Differences::of(earlier, &later, compared);
+            return Ok((later, Differences { of_one_motion: true, ..differences }));
+        }
         // Where the earlier drive was linearised, and where its model is fitted to either drive: fits may end apart although nothing has changed. Where the
         // drives contradict each other the least they are compared at their best. A place that the model runs away from tells nothing.
         let mut at = |fitted: bool| {
@@ -122,6 +140,31 @@ impl Earlier {
         let differences = Differences::of(earlier, &later, compared);
         Ok((later, differences))
     }
+}
+
+/// What differs between two recordings of one motion, linearised around what has changed until that stays; and the later one's model, its parameters and its terms.
+fn of_one_motion(
+    paired: &Paired<'_, '_>,
+    engine: &Engine<'_>,
+    earlier: &Inferred,
+    slip_rad: [f64; 2],
+) -> Option<(Compared, (Vec<f64>, Vec<usize>))> {
+    let mut values = earlier.values.clone();
+    let mut before = Vec::new();
+    for round in 1.. {
+        let by = paired.difference(&mut values)?.at(&values, &earlier.values);
+        let compared = compare_paired(engine, earlier, &by, round > FAR_ROUNDS, slip_rad)?;
+        values = compared.changed_values(earlier);
+        let changed = compared.changed();
+        if (changed == before && round > FAR_ROUNDS + 1) || round == ROUNDS {
+            let terms = earlier.terms.iter().zip(&earlier.chosen).zip(&changed);
+            let chosen = terms.map(|((t, c), changed)| if *changed { t.log_weights.len() - 1 } else { *c });
+            let chosen = chosen.collect();
+            return Some((compared, (values, chosen)));
+        }
+        before = changed;
+    }
+    None
 }
 
 /// Two drives in the same columns, and what differs.
@@ -185,6 +228,8 @@ pub(crate) struct Differences {
     /// The earlier drive, linearised as the later one is.
     earlier: Inferred,
     compared: Compared,
+    /// Whether they were compared sample by sample.
+    pub(crate) of_one_motion: bool,
     /// Squared error that one model, fitted to either drive, leaves of the later one over that of the earlier one.
     pub(crate) error_over_earlier: f64,
     pub(crate) changes: Vec<Change>,
@@ -194,6 +239,7 @@ pub(crate) struct Differences {
 
 impl Differences {
     fn of(earlier: Inferred, later: &Inferred, compared: Compared) -> Self {
+        let of_one_motion = false;
         let error = |of: &Inferred| of.weighed.cost / of.weighed.residuals;
         let error_over_earlier = error_over(error(later), error(&earlier));
         let changes = compared.changes(&earlier);
@@ -206,7 +252,7 @@ impl Differences {
             .filter(stands_out)
             .collect();
         accepted.dedup();
-        Self { earlier, compared, error_over_earlier, changes, accepted }
+        Self { earlier, compared, of_one_motion, error_over_earlier, changes, accepted }
     }
 
     /// The changes that are likelier than not.

@@ -220,10 +220,7 @@ pub(crate) fn linearised(
     // The same sensors: no less noise than the first drive was found to have.
     engine.sigma.clone_from(&frame.sigma);
     let base = engine.sigma.clone();
-    let there = |range: std::ops::Range<usize>| range.into_iter().any(|c| from[c] != 0.0);
-    let sites: Vec<Site> = Site::ALL.into_iter().filter(|s| there(columns.of_site(*s))).collect();
-    let (model, own, _) = columns.model(engine, from, |e| columns.of_effect(e).is_some_and(&there), &sites);
-    let mut starts = engine.score_model(&model, &own, windows).starts;
+    let mut starts = starts(engine, columns, from, windows);
     for round in 1.. {
         let mut joint = Joint::around(engine, columns, &values, &starts, windows)?;
         differences(engine, columns, &mut values, &starts, windows, &mut joint);
@@ -276,6 +273,19 @@ pub(crate) fn linearised(
     None
 }
 
+/// The start states at which a model does best.
+pub(crate) fn starts(
+    engine: &Engine<'_>,
+    columns: &Columns,
+    values: &[f64],
+    windows: &Windows,
+) -> Vec<[f64; 2]> {
+    let there = |range: std::ops::Range<usize>| range.into_iter().any(|c| values[c] != 0.0);
+    let sites: Vec<Site> = Site::ALL.into_iter().filter(|s| there(columns.of_site(*s))).collect();
+    let (model, own, _) = columns.model(engine, values, |e| columns.of_effect(e).is_some_and(&there), &sites);
+    engine.score_model(&model, &own, windows).starts
+}
+
 /// What even all terms together leave of each channel counts as noise: by how much more than the weights have it, which are raised.
 pub(crate) fn noise_scale(
     engine: &mut Engine<'_>,
@@ -314,7 +324,7 @@ pub(crate) fn repeated(weighed: &Weighed, terms: &[Term], open: &[usize]) -> Opt
 }
 
 /// For effects whose derivative vanishes where they are absent: the difference quotient to one of their starts, the one that promises most.
-fn differences(
+pub(crate) fn differences(
     engine: &Engine<'_>,
     columns: &Columns,
     values: &mut [f64],

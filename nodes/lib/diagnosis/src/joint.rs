@@ -122,6 +122,12 @@ impl Joint {
         finite.then(|| Self { parts, block: windows.block.clone(), channels, columns: columns.len() })
     }
 
+    /// What is left of each sample beyond what another recording of the same windows leaves of it; samples that one of them lacks are left out.
+    pub(crate) fn beyond(self, other: &Self) -> Self {
+        let parts = self.parts.iter().zip(&other.parts).map(|(part, other)| part.beyond(other)).collect();
+        Self { parts, ..self }
+    }
+
     /// Puts a column's difference quotient in place of its derivative: for an effect whose derivative vanishes where it is absent. `differences`:
     /// predictions with the effect less those without, over its value, window after window in the layout of the model.
     pub(crate) fn with_column(&mut self, engine: &Engine<'_>, column: usize, slopes: &[Vec<f64>]) {
@@ -272,6 +278,24 @@ impl Part {
     fn is_calm(&self) -> bool {
         let calm = |v: &f64| v.is_finite() && v.abs() < RUN_AWAY;
         self.residual.iter().chain(self.jacobian.iter()).chain(self.start.iter()).all(calm)
+    }
+
+    fn beyond(&self, other: &Self) -> Self {
+        let place = |row: &usize| other.kept.binary_search(&self.kept[*row]).ok();
+        let rows: Vec<usize> = (0..self.kept.len()).filter(|row| place(row).is_some()).collect();
+        let left = rows.iter().map(|row| self.residual[*row] - place(row).map_or(0.0, |o| other.residual[o]));
+        let mut out = Self {
+            residual: DVector::from_iterator(rows.len(), left),
+            jacobian: self.jacobian.select_rows(&rows),
+            start: self.start.select_rows(&rows),
+            channel: rows.iter().map(|&row| self.channel[row]).collect(),
+            kept: rows.iter().map(|&row| self.kept[row]).collect(),
+        };
+        // Where either model runs away nothing is told.
+        if [self, other].iter().any(|part| part.start.iter().all(|s| *s == 0.0)) {
+            out.blank();
+        }
+        out
     }
 
     /// The window with nothing said.

@@ -48,6 +48,7 @@ mod inferred;
 mod joint;
 mod noise;
 mod outcome;
+mod paired;
 mod patch;
 mod pictures;
 mod place;

@@ -179,6 +179,12 @@ fn of_two_drives_only_what_has_changed_is_told() {
     };
     let itself = since(&late);
     assert!(itself.verdict == Verdict::NoGap && itself.changes.is_empty(), "{}", text(&itself));
+    // The same motion with a signal of which a driver's update makes something else: sample by sample nothing hides that.
+    let biased = StateSequence { v_y_mps: late.v_y_mps.iter().map(|v| v + 0.03).collect(), ..late.clone() };
+    let biased = since(&biased);
+    assert_eq!(named(&biased), ["v_y_bias"], "{}", text(&biased));
+    let [change] = &biased.changes[..] else { panic!("{}", text(&biased)) };
+    assert!((change.difference.value - 0.03).abs() < 0.001, "{}", text(&biased));
     let same = since(&late_too);
     assert!(matches!(same.verdict, Verdict::NoGap | Verdict::TireRetuneOnly), "{}", text(&same));
     // What only one of them records is left out of both.
