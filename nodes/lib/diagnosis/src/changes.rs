@@ -25,7 +25,6 @@ use crate::between::Between;
 use crate::infer::FIRST;
 use crate::inferred::Inferred;
 use crate::outcome::EffectParameter;
-use crate::paired::Difference;
 use crate::sizes::{Sized, half_widths_of_difference};
 use crate::tire_change::ForceChange;
 use crate::trust::TireTrust;
@@ -36,6 +35,8 @@ const SAME: f64 = 0.03;
 const SAME_FLEXIBLE: f64 = 0.5;
 /// Standard deviation of a change of the tires, over that of tires that are the same.
 const OTHER_TIRES: f64 = 10.0;
+/// Of the draws of configurations.
+pub(crate) const SEED: u64 = 23;
 /// Share of a dispersion above which it is the same.
 const SETTLED: f64 = 0.95;
 
@@ -92,154 +93,27 @@ pub(crate) fn compare(
     // What the drives contradict each other by is at first all a failing of the model. What is so large that it stands out all the same is a change, explains
     // its share of the contradictions, and lets smaller ones stand out.
     let mut dispersion = between.dispersion(&here, &DVector::zeros(n));
-    let mut selection = select(&problem, dispersion, &terms, &start, 23)?;
+    let mut selection = select(&problem, dispersion, &terms, &start, SEED)?;
     loop {
         let left = between.dispersion(&here, &selection.best_step.rows(n, n).into_owned());
         if left > SETTLED * dispersion {
             break;
         }
         dispersion = left;
-        selection = select(&problem, dispersion, &terms, &selection.best, 23)?;
+        selection = select(&problem, dispersion, &terms, &selection.best, SEED)?;
     }
     // A difference that no effect does is worth a word only where it closes as much as free terms must in a drive by itself; so is an effect whose derivative
     // vanishes where it is absent, as no size of it is far from nothing or near.
     let asked = (groups(earlier, |e| e.spec().flat_at_null), later.weighed.cost / later.dispersion);
-    Compared::of(engine, earlier, (problem, dispersion), terms, selection, &asked, slip_rad)
-}
-
-/// Compares two recordings of one motion. `by`: what they differ by, around the earlier one's model; `free`: whether something that no effect does is asked for, too.
-pub(crate) fn compare_paired(
-    engine: &Engine<'_>,
-    earlier: &Inferred,
-    by: &Difference,
-    free: bool,
-    slip_rad: [f64; 2],
-) -> Option<Compared> {
-    let n = earlier.columns.len();
-    let mut problem =
-        Quadratic { information: DMatrix::zeros(2 * n, 2 * n), gradient: DVector::zeros(2 * n) };
-    let of_earlier = &earlier.weighed.total;
-    let dispersion = earlier.dispersion;
-    problem.information.view_mut((0, 0), (n, n)).copy_from(&(&of_earlier.information / dispersion));
-    problem.information.view_mut((n, n), (n, n)).copy_from(&by.problem.information);
-    problem.gradient.rows_mut(0, n).copy_from(&(&of_earlier.gradient / dispersion));
-    problem.gradient.rows_mut(n, n).copy_from(&by.problem.gradient);
-    let same = the_same(earlier, differences(engine, earlier, 0.0));
-    let alone: Vec<Term> = same.iter().map(|t| Term { from: t.from - n, ..t.clone() }).collect();
-    let changed = forward(by, &alone, &candidates(earlier, free))?;
-    let kept = same.into_iter().zip(&changed).map(|(t, &c)| if c > 0 { t } else { t.only(0) });
-    let terms: Vec<Term> = earlier.terms.iter().cloned().chain(kept).collect();
-    let start = [&earlier.selection.best[..], &changed].concat();
-    let selection = select(&problem, 1.0, &terms, &start, 23)?;
-    Compared::of(engine, earlier, (problem, 1.0), terms, selection, &(Vec::new(), by.left), slip_rad)
-}
-
-/// Differences of one car in one motion: what has not changed is the same, and no large evidence makes it differ by as little as two drives of a car may.
-fn the_same(earlier: &Inferred, mut differences: Vec<Term>) -> Vec<Term> {
-    /// What is left of a standard deviation.
-    const GONE: f64 = 1e-3;
-    let sizing =
-        |t: usize| earlier.columns.effects.get(t.wrapping_sub(FIRST)).map_or(usize::MAX, |e| e.sizing());
-    for (t, term) in differences.iter_mut().enumerate() {
-        term.priors.iter_mut().take(sizing(t)).for_each(|p| p.sigma[0] *= GONE);
-    }
-    differences
-}
-
-/// What may have changed, as groups of terms of the differences, each with the share of what it explains that counts beside an effect: an effect is taken for the cause where
-/// it does nearly as much as tires or free terms, which do what any cause at their site does.
-fn candidates(earlier: &Inferred, free: bool) -> Vec<(Range<usize>, f64)> {
-    let effects = earlier.columns.effects.iter().filter(|e| earlier.is_open(**e));
-    let effects = effects.filter_map(|e| earlier.term_of(*e)).map(|t| (t..t + 1, 1.0));
-    let sites = Site::ALL.into_iter().filter(|_| free).map(|site| earlier.terms_of_site(site));
-    let any = std::iter::once(0..1).chain(sites).map(|terms| (terms, 1.0 - decisions::RIVAL_LEAVES));
-    effects.chain(any).collect()
-}
-
-/// Takes in the candidate that explains most, one after the other, as long as it closes a share of the error (forward selection; Efroymson 1960, "Multiple
-/// regression analysis"), and takes out again what the others make needless.
-fn forward(
-    Difference { problem, left: all }: &Difference,
-    terms: &[Term],
-    candidates: &[(Range<usize>, f64)],
-) -> Option<Vec<usize>> {
-    let with = |chosen: &[usize], group: &Range<usize>, there: usize| {
-        let mut out = chosen.to_vec();
-        out[group.clone()].fill(there);
-        out
-    };
-    let left = |chosen: &[usize]| {
-        let step = configuration(problem, 1.0, terms, chosen)?.step;
-        Some((2.0 * &problem.gradient + &problem.information * &step).dot(&step) / all)
-    };
-    let mut chosen = vec![0; terms.len()];
-    let is_in = |chosen: &[usize], group: &Range<usize>| chosen[group.start] > 0;
-    for _ in candidates {
-        let now = left(&chosen)?;
-        let closes = |(group, counts): &(Range<usize>, f64)| {
-            Some((group.clone(), (now - left(&with(&chosen, group, 1))?) * counts))
-        };
-        let offered = candidates.iter().filter(|c| !is_in(&chosen, &c.0)).filter_map(closes);
-        let best = offered.max_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((group, _)) = best.filter(|b| b.1 >= decisions::LEAST_CLOSED) else { break };
-        chosen = with(&chosen, &group, 1);
-        loop {
-            let now = left(&chosen)?;
-            let closes = |(group, _): &(Range<usize>, f64)| {
-                Some((group.clone(), left(&with(&chosen, group, 0))? - now))
-            };
-            let inside = candidates.iter().filter(|c| is_in(&chosen, &c.0)).filter_map(closes);
-            let least = inside.min_by(|a, b| a.1.total_cmp(&b.1));
-            match least.filter(|l| l.1 < decisions::LEAST_CLOSED) {
-                Some((group, _)) => chosen = with(&chosen, &group, 0),
-                None => break,
-            }
+    while let Some(needless) = needless(&problem, dispersion, &terms, &selection.best, &asked) {
+        for t in needless {
+            terms[t] = terms[t].only(0);
         }
+        let start: Vec<usize> =
+            selection.best.iter().zip(&terms).map(|(a, t)| (*a).min(t.log_weights.len() - 1)).collect();
+        selection = select(&problem, dispersion, &terms, &start, SEED)?;
     }
-    Some(chosen)
-}
-
-impl Compared {
-    /// What is left of a selection: of the groups of differences `asked` for those that close enough of an error.
-    fn of(
-        engine: &Engine<'_>,
-        earlier: &Inferred,
-        (problem, dispersion): (Quadratic, f64),
-        mut terms: Vec<Term>,
-        mut selection: Selection,
-        asked: &(Vec<Range<usize>>, f64),
-        slip_rad: [f64; 2],
-    ) -> Option<Self> {
-        let n = earlier.columns.len();
-        while let Some(needless) = needless(&problem, dispersion, &terms, &selection.best, asked) {
-            for t in needless {
-                terms[t] = terms[t].only(0);
-            }
-            let start: Vec<usize> =
-                selection.best.iter().zip(&terms).map(|(a, t)| (*a).min(t.log_weights.len() - 1)).collect();
-            selection = select(&problem, dispersion, &terms, &start, 23)?;
-        }
-        let of = |(i, &effect): (usize, &EffectId)| {
-            let sized = wide(&selection, earlier.terms.len() + FIRST + i);
-            (sized.0.clone(), half_widths_of_difference(engine, effect, &sized))
-        };
-        let by = earlier.columns.effects.iter().enumerate().map(of).collect();
-        let tires = {
-            let mut chosen = selection.best.clone();
-            let place = earlier.terms.len();
-            chosen[place] = terms[place].log_weights.len() - 1;
-            let other = configuration(&problem, dispersion, &terms, &chosen)?;
-            let columns: Vec<usize> = (0..TIRES).chain(n..n + TIRES).collect();
-            let covariance = other.covariance().select_rows(&columns).select_columns(&columns);
-            let before: Vec<f64> = (0..TIRES).map(|c| earlier.values[c] + other.step[c]).collect();
-            let by = other.step.rows(n, TIRES);
-            // The share of grip that matters.
-            let sizes = of_other_tires().map(|e| engine.size(&e.spec().parameters[0]));
-            let size = sizes.fold(0.0, f64::max);
-            ForceChange::of_axles(size, [&before, by.as_slice()], &covariance, slip_rad)
-        };
-        Some(Self { selection, by, dispersion, terms: earlier.terms.len(), tires })
-    }
+    Compared::of(engine, earlier, (&problem, &terms), (selection, dispersion), slip_rad)
 }
 
 /// A term's step with standard deviations where it is wide open.
@@ -281,7 +155,7 @@ fn groups(earlier: &Inferred, asked: impl Fn(EffectId) -> bool) -> Vec<Range<usi
 }
 
 /// The differences as terms: nothing to speak of, or a change. `of_one`: share of what is unexplained that belongs to one of the drives.
-fn differences(engine: &Engine<'_>, earlier: &Inferred, of_one: f64) -> Vec<Term> {
+pub(crate) fn differences(engine: &Engine<'_>, earlier: &Inferred, of_one: f64) -> Vec<Term> {
     let n = earlier.columns.len();
     let unbounded = [f64::NEG_INFINITY, f64::INFINITY];
     let weights = || vec![(1.0 - decisions::PRIOR).ln(), decisions::PRIOR.ln()];
@@ -348,6 +222,37 @@ fn differences(engine: &Engine<'_>, earlier: &Inferred, of_one: f64) -> Vec<Term
 }
 
 impl Compared {
+    /// What a selection comes to.
+    pub(crate) fn of(
+        engine: &Engine<'_>,
+        earlier: &Inferred,
+        (problem, terms): (&Quadratic, &[Term]),
+        (selection, dispersion): (Selection, f64),
+        slip_rad: [f64; 2],
+    ) -> Option<Self> {
+        let n = earlier.columns.len();
+        let of = |(i, &effect): (usize, &EffectId)| {
+            let sized = wide(&selection, earlier.terms.len() + FIRST + i);
+            (sized.0.clone(), half_widths_of_difference(engine, effect, &sized))
+        };
+        let by = earlier.columns.effects.iter().enumerate().map(of).collect();
+        let tires = {
+            let mut chosen = selection.best.clone();
+            let place = earlier.terms.len();
+            chosen[place] = terms[place].log_weights.len() - 1;
+            let other = configuration(problem, dispersion, terms, &chosen)?;
+            let columns: Vec<usize> = (0..TIRES).chain(n..n + TIRES).collect();
+            let covariance = other.covariance().select_rows(&columns).select_columns(&columns);
+            let before: Vec<f64> = (0..TIRES).map(|c| earlier.values[c] + other.step[c]).collect();
+            let by = other.step.rows(n, TIRES);
+            // The share of grip that matters.
+            let sizes = of_other_tires().map(|e| engine.size(&e.spec().parameters[0]));
+            let size = sizes.fold(0.0, f64::max);
+            ForceChange::of_axles(size, [&before, by.as_slice()], &covariance, slip_rad)
+        };
+        Some(Self { selection, by, dispersion, terms: earlier.terms.len(), tires })
+    }
+
     /// Probability that a term differs; none where no difference is asked for.
     fn probability(&self, term: usize) -> f64 {
         match &self.selection.probability[self.terms + term][..] {
@@ -375,16 +280,17 @@ impl Compared {
         self.selection.best[self.terms..2 * self.terms].iter().map(|&c| c > 0).collect()
     }
 
-    /// Parameters of the later drive by what has changed since the earlier one's model.
-    pub(crate) fn changed_values(&self, earlier: &Inferred) -> Vec<f64> {
+    /// The earlier drive's model with what has changed: parameters and configuration.
+    pub(crate) fn changed_model(&self, earlier: &Inferred) -> (Vec<f64>, Vec<usize>) {
         let n = earlier.values.len();
-        let mut out = earlier.values.clone();
-        for (term, _) in earlier.terms.iter().zip(self.changed()).filter(|(_, changed)| *changed) {
-            for c in term.from..term.from + term.priors.len() {
-                out[c] += self.selection.best_step[n + c];
-            }
+        let (mut values, mut chosen) = (earlier.values.clone(), earlier.chosen.clone());
+        for (t, term) in earlier.terms.iter().enumerate().filter(|(t, _)| self.changed()[*t]) {
+            chosen[t] = term.log_weights.len() - 1;
+            let columns = term.from..term.from + term.priors.len();
+            let step = self.selection.best_step.rows(n + term.from, term.priors.len());
+            values[columns].iter_mut().zip(&step).for_each(|(v, by)| *v += by);
         }
-        out
+        (values, chosen)
     }
 
     /// Parameters of the later drive there.
@@ -494,41 +400,5 @@ impl Compared {
         out.retain(|c| c.probability >= decisions::LISTED);
         out.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         out
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// What is left of a cause on the first column, which the second and third together explain wholly; the fourth explains something else.
-    fn chosen(of_first: f64, of_fourth: f64) -> Vec<usize> {
-        let prior = || ColumnPrior {
-            offset: 0.0,
-            sigma: vec![1e-6, 100.0],
-            bounds: [f64::NEG_INFINITY, f64::INFINITY],
-        };
-        let terms: Vec<Term> = (0..4)
-            .map(|from| Term { from, priors: vec![prior()], log_weights: vec![0.95_f64.ln(), 0.05_f64.ln()] })
-            .collect();
-        // The first column lies, but for a share of its square, in the plane of the second and third.
-        let inside = of_first.sqrt();
-        let rows = [[inside, 1.0, 0.0, 0.0], [(1.0 - of_first).sqrt(), 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
-        let jacobian = DMatrix::from_fn(3, 4, |r, c| 100.0 * rows[r][c]);
-        let residual = DVector::from_row_slice(&[100.0, 0.0, 100.0 * of_fourth]);
-        let problem =
-            Quadratic { information: jacobian.tr_mul(&jacobian), gradient: -jacobian.tr_mul(&residual) };
-        let by = Difference { problem, left: residual.norm_squared() };
-        forward(&by, &terms, &[(0..1, 1.0), (1..3, 1.0 - decisions::RIVAL_LEAVES), (3..4, 1.0)]).unwrap()
-    }
-
-    #[test]
-    fn an_effect_that_does_nearly_as_much_as_free_terms_is_taken_for_the_cause() {
-        assert_eq!(chosen(0.99, 0.0), [1, 0, 0, 0]);
-        // One that does half of it is not.
-        assert_eq!(chosen(0.5, 0.0), [0, 1, 1, 0]);
-        // Another change beside it is told, and one that closes a hundredth is not.
-        assert_eq!(chosen(0.99, 0.5), [1, 0, 0, 1]);
-        assert_eq!(chosen(0.99, 0.1), [1, 0, 0, 0]);
     }
 }

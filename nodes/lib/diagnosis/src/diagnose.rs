@@ -198,7 +198,7 @@ pub(crate) fn explain(
     let (verdict, mut reasons) = match &differences {
         Some(differences) => {
             let mut reasons = errors(&budget, model.named.is_empty());
-            reasons.extend(differences.reason());
+            reasons.extend(differences.reasons());
             (differences.verdict(), reasons)
         }
         None => decide(&budget, &inferred, &library),

@@ -8,7 +8,7 @@ use gripsight_vehicle::VehicleParameters;
 
 use crate::answer::Change;
 use crate::budget::Budget;
-use crate::changes::{Compared, compare, compare_paired};
+use crate::changes::{Compared, compare};
 use crate::decisions;
 use crate::diagnose::{SEARCH_WINDOWS, explain};
 use crate::engine::Engine;
@@ -25,11 +25,6 @@ use crate::{ExtendedModelFile, GapError, Request, Verdict};
 
 /// Times at most that a later drive is linearised anew, around what has changed.
 const AROUND_CHANGES: usize = 3;
-
-/// Times at most that two recordings of one motion are linearised.
-const ROUNDS: usize = 8;
-/// Of these the first, in which effects alone are asked for: beside free terms a linearisation far from the cause would blame them.
-const FAR_ROUNDS: usize = 3;
 
 /// A drive from before with its own diagnosis. A later drive is compared with all that was found in it: tires, effects, and what they left.
 #[derive(Debug, Clone)]
@@ -105,9 +100,9 @@ impl Earlier {
             let model = (&frame.values[..], &frame.chosen[..]);
             let earlier = linearised(&mut before, &frame, model, false, &here).ok_or(GapError::NotFinite)?;
             let earlier = Inferred { chosen: frame.chosen.clone(), sizes: frame.sizes.clone(), ..earlier };
-            let (compared, model) =
-                of_one_motion(&paired, &before, &earlier, slip_rad).ok_or(GapError::NotFinite)?;
-            let later = linearised(&mut after, &frame, (&model.0, &model.1), true, &there);
+            let compared = paired.compared(&before, &earlier, slip_rad).ok_or(GapError::NotFinite)?;
+            let (values, chosen) = compared.changed_model(&earlier);
+            let later = linearised(&mut after, &frame, (&values, &chosen), true, &there);
             let later = later.ok_or(GapError::NotFinite)?;
             let differences = Differences::of(earlier, &later, compared);
             return Ok((later, Differences { of_one_motion: true, ..differences }));
@@ -140,31 +135,6 @@ impl Earlier {
         let differences = Differences::of(earlier, &later, compared);
         Ok((later, differences))
     }
-}
-
-/// What differs between two recordings of one motion, linearised around what has changed until that stays; and the later one's model, its parameters and its terms.
-fn of_one_motion(
-    paired: &Paired<'_, '_>,
-    engine: &Engine<'_>,
-    earlier: &Inferred,
-    slip_rad: [f64; 2],
-) -> Option<(Compared, (Vec<f64>, Vec<usize>))> {
-    let mut values = earlier.values.clone();
-    let mut before = Vec::new();
-    for round in 1.. {
-        let by = paired.difference(&mut values)?.at(&values, &earlier.values);
-        let compared = compare_paired(engine, earlier, &by, round > FAR_ROUNDS, slip_rad)?;
-        values = compared.changed_values(earlier);
-        let changed = compared.changed();
-        if (changed == before && round > FAR_ROUNDS + 1) || round == ROUNDS {
-            let terms = earlier.terms.iter().zip(&earlier.chosen).zip(&changed);
-            let chosen = terms.map(|((t, c), changed)| if *changed { t.log_weights.len() - 1 } else { *c });
-            let chosen = chosen.collect();
-            return Some((compared, (values, chosen)));
-        }
-        before = changed;
-    }
-    None
 }
 
 /// Two drives in the same columns, and what differs.
@@ -307,13 +277,16 @@ impl Differences {
     }
 
     /// What the verdict rests on that is no change by itself.
-    pub(crate) fn reason(&self) -> Option<String> {
-        self.is_out_of_reach().then(|| {
+    pub(crate) fn reasons(&self) -> Vec<String> {
+        let paired = "the two are recordings of one motion, and were compared sample by sample: what no model says of the car is in both and hides no change";
+        let out_of_reach = || {
             format!(
                 "the model that explains the drive before leaves {:.0} times its squared error in this one, fitted to it as well: something differs that no change explains",
                 self.error_over_earlier
             )
-        })
+        };
+        let paired = self.of_one_motion.then(|| paired.to_owned());
+        paired.into_iter().chain(self.is_out_of_reach().then(out_of_reach)).collect()
     }
 
     /// The verdict: effects where some have changed, other tires, something that the library lacks, or nothing.
