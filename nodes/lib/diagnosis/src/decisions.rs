@@ -81,7 +81,8 @@ pub(crate) fn chance(size_over_half_width: f64) -> f64 {
 }
 
 /// Share of an effect that stays unexplained where another one, which does nearly the same and is not among the candidates, is the cause: the lower end of its
-/// 90 % interval by `fit_chance.py` on the cases above, as a wrong name is worse than none.
+/// 90 % interval by `fit_chance.py` on the cases above, as a wrong name is worse than none. So an effect that leaves less of what the free terms of its site
+/// explain is taken for the cause.
 pub(crate) const RIVAL_LEAVES: f64 = 0.14;
 
 /// Standard deviations in half the width of a 90 % interval.

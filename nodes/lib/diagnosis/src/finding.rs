@@ -227,7 +227,8 @@ impl Shares {
     fn closed(&self, inferred: &Inferred, mechanisms: &[usize], other: Range<usize>) -> [Estimate; 2] {
         let with = |terms: &mut dyn Iterator<Item = usize>| {
             let mut chosen = vec![0; inferred.terms.len()];
-            terms.for_each(|t| chosen[t] = usize::from(inferred.chosen[t] > 0));
+            let is_in = |t: usize| inferred.chosen[t] > 0 || inferred.beside.contains(&t);
+            terms.for_each(|t| chosen[t] = usize::from(is_in(t)));
             let found = configuration(&inferred.weighed.total, inferred.dispersion, &self.terms, &chosen);
             let drops = found.map(|c| drops(inferred, &self.null, &c.step));
             drops.map_or(Estimate::UNKNOWN, |drops| {

@@ -129,7 +129,7 @@ pub(crate) fn infer(
             let confirmed = around.confirmed(&weighed.total, &selection, &losses)?;
             progress("asking data that nothing was fitted to");
             let fits = Fits::default();
-            let mut found = around.stated(&weighed, (best, fitted), closed, scorer, &fits)?;
+            let mut found = around.stated(&weighed, (best, fitted), (closed, &[]), scorer, &fits)?;
             let mut sizes = Sizes::of(&around, library, &found.chosen, &found.fitted, windows)?;
             // What is left is another model than the one that everything was linearised around.
             let mut linearised = chosen;
@@ -141,7 +141,7 @@ pub(crate) fn infer(
                 (found, sizes) =
                     again(engine, &columns, library, windows, dispersion, (scorer, &fits), found)?;
             }
-            let Stated { chosen: best, statements: mut stated, .. } = found;
+            let Stated { chosen: best, beside, statements: mut stated, .. } = found;
             for statement in &mut stated {
                 let effect = columns.effects[statement.term - FIRST];
                 statement.untried = untried(effect, library).count();
@@ -150,6 +150,7 @@ pub(crate) fn infer(
             }
             return Some(Inferred {
                 chosen: best,
+                beside,
                 stated: Some(stated),
                 columns,
                 tires: engine.nominal,
@@ -181,7 +182,7 @@ fn again(
     windows: &Windows,
     dispersion: f64,
     (scorer, fits): (&Scorer<'_>, &Fits),
-    Stated { chosen, fitted, .. }: Stated,
+    Stated { chosen, fitted, beside, .. }: Stated,
 ) -> Option<(Stated, Sizes)> {
     let (mut values, starts) = (fitted.values.clone(), &fitted.starts);
     let mut joint = Joint::around(engine, columns, &values, starts, windows)?;
@@ -201,7 +202,7 @@ fn again(
         scale: &scale,
     };
     fits.forget_places_apart_from(&chosen, columns);
-    let found = around.stated(&weighed, (chosen, fitted.clone()), None, scorer, fits)?;
+    let found = around.stated(&weighed, (chosen, fitted.clone()), (None, &beside), scorer, fits)?;
     let sizes = Sizes::of(&around, library, &found.chosen, &found.fitted, windows)?;
     Some((found, sizes))
 }
@@ -239,6 +240,7 @@ pub(crate) fn linearised(
             let sizes = Sizes::unknown(values.clone());
             return Some(Inferred {
                 chosen: selection.best.clone(),
+                beside: Vec::new(),
                 stated: None,
                 columns: columns.clone(),
                 tires: engine.nominal,
@@ -433,6 +435,7 @@ mod tests {
         let nothing = Stated {
             chosen: vec![0; FIRST + columns.effects.len() + columns.len() - columns.first_flexible()],
             fitted: Refined { values, starts: null.starts },
+            beside: Vec::new(),
             statements: Vec::new(),
         };
         let (found, sizes) =

@@ -25,6 +25,8 @@ pub(crate) struct Inferred {
     pub(crate) selection: Selection,
     /// The configuration that is left in the end.
     pub(crate) chosen: Vec<usize>,
+    /// Free terms that it needs beside effects which do most of what they do: what is left is stated, and the effects are sized without them.
+    pub(crate) beside: Vec<usize>,
     /// Its effects; `None` where held-out data were not asked.
     pub(crate) stated: Option<Vec<Statement>>,
     /// Probability that each term matters, confirmed by rollouts.
@@ -56,7 +58,7 @@ impl Inferred {
     pub(crate) fn other(&self, site: Site) -> f64 {
         let terms = self.terms_of_site(site);
         let by_fit = self.selection.probability_that(|c| c[terms.clone()].iter().any(|&a| a > 0));
-        let needed = self.chosen[terms].iter().any(|&a| a > 0);
+        let needed = terms.clone().any(|t| self.chosen[t] > 0 || self.beside.contains(&t));
         if needed { by_fit } else { by_fit.min(decisions::NEEDLESS) }
     }
 

@@ -78,10 +78,21 @@ struct Needed {
     rivals: Vec<(usize, f64)>,
 }
 
+/// A configuration from which everything was taken that is not needed.
+struct Weeded {
+    left: Tried,
+    /// The same without each effect.
+    simpler: Vec<(usize, Tried)>,
+    /// Free terms whose place an effect took, and that still explain something.
+    taken: Vec<usize>,
+}
+
 /// What is left in the end.
 pub(crate) struct Stated {
     pub(crate) chosen: Vec<usize>,
     pub(crate) fitted: Refined,
+    /// Free terms whose place an effect took, and that are needed beside it: something is left there that no effect does.
+    pub(crate) beside: Vec<usize>,
     pub(crate) statements: Vec<Statement>,
 }
 
@@ -99,12 +110,13 @@ impl Around<'_, '_> {
     }
 
     /// Asks data that nothing was fitted to. Their predictive ratio, times the odds before the data are looked at, decides what is in the model.
-    /// `start`: the most probable configuration by the fitted data, and its fit; `alone`: that of effects alone.
+    /// `start`: the most probable configuration by the fitted data, and its fit; `alone`: that of effects alone; `beside`: free terms whose place effects of
+    /// the start took.
     pub(crate) fn stated(
         &self,
         weighed: &Weighed,
         (start, fitted): (Vec<usize>, Refined),
-        alone: Option<Vec<usize>>,
+        (alone, beside): (Option<Vec<usize>>, &[usize]),
         scorer: &Scorer<'_>,
         fits: &Fits,
     ) -> Option<Stated> {
@@ -121,13 +133,15 @@ impl Around<'_, '_> {
             }
         }
         let least = nothing.cost;
-        let (mut now, mut simpler) = asked.weeded(now)?;
+        let mut weeded = asked.weeded(now)?;
         // Each part may be needed beside the others, and all of them lead nowhere.
-        if least < now.cost {
-            (now, simpler) = asked.weeded(nothing)?;
+        if least < weeded.left.cost {
+            weeded = asked.weeded(nothing)?;
         }
-        let (now, simpler) = asked.with_the_likeliest_of_alike(now, simpler);
-        let discrepancy = Discrepancy::of(self, &weighed.total, &now.chosen, &now.fitted.values)?;
+        let (now, simpler) = asked.with_the_likeliest_of_alike(weeded.left, weeded.simpler);
+        let taken = [beside, &weeded.taken].concat();
+        let (beside, whole) = asked.with_what_is_left(&now, &taken);
+        let discrepancy = Discrepancy::of(self, &weighed.total, &whole.chosen, &whole.fitted.values)?;
         let statements = simpler
             .into_iter()
             .map(|Needed { term, lacking, rivals }| Statement {
@@ -141,7 +155,7 @@ impl Around<'_, '_> {
                 over_unexplained: discrepancy.beside(self.columns.effects[term - FIRST], &now.fitted.values),
             })
             .collect();
-        Some(Stated { chosen: now.chosen, fitted: now.fitted, statements })
+        Some(Stated { chosen: now.chosen, fitted: now.fitted, beside, statements })
     }
 }
 
@@ -247,9 +261,9 @@ impl Asked<'_, '_, '_, '_> {
         terms.filter(|&t| of.chosen[t] > 0).collect()
     }
 
-    /// Takes in what is likely and out what is not, by turns until nothing changes; what is left, and that without each effect.
-    fn weeded(&self, start: Tried) -> Option<(Tried, Vec<(usize, Tried)>)> {
-        let mut now = self.with_effects_for_free_terms(self.without_needless_free_terms(start));
+    /// Takes in what is likely and out what is not, by turns until nothing changes.
+    fn weeded(&self, start: Tried) -> Option<Weeded> {
+        let (mut now, taken) = self.with_effects_for_free_terms(self.without_needless_free_terms(start));
         let mut turns = 0;
         loop {
             let fuller = self.with_likely_effects(now)?;
@@ -258,7 +272,7 @@ impl Asked<'_, '_, '_, '_> {
             let (left, simpler) = self.without_unlikely_effects(self.without_needless_free_terms(fuller));
             turns += 1;
             if left.chosen == full || turns == TURNS {
-                return Some((left, simpler));
+                return Some(Weeded { left, simpler, taken });
             }
             now = left;
         }
@@ -282,8 +296,10 @@ impl Asked<'_, '_, '_, '_> {
         }
     }
 
-    /// Puts an effect in the place of its site's free terms where it does as well: they do, roughly, what any cause there does.
-    fn with_effects_for_free_terms(&self, mut now: Tried) -> Tried {
+    /// Puts an effect in the place of its site's free terms where it does as well, or leaves less of what they do than an effect does that is not the cause: they do,
+    /// roughly, what any cause there does. The terms that still explain something are given, too.
+    fn with_effects_for_free_terms(&self, mut now: Tried) -> (Tried, Vec<usize>) {
+        let mut taken = Vec::new();
         for site in Site::ALL {
             let free = self.free_terms(&now, site);
             if free.is_empty() {
@@ -300,12 +316,41 @@ impl Asked<'_, '_, '_, '_> {
             promised.retain(|&i| is_here(i));
             promised.truncate(FITTED);
             let tried = promised.into_par_iter().filter_map(|i| self.fitted(swapped(i), now.place()));
-            let best = tried.min_by(|a, b| a.cost.total_cmp(&b.cost));
-            if let Some(best) = best.filter(|b| 1.0 - now.cost / b.cost < decisions::LEAST_CLOSED) {
+            let Some(best) = tried.min_by(|a, b| a.cost.total_cmp(&b.cost)) else { continue };
+            let as_well = 1.0 - now.cost / best.cost < decisions::LEAST_CLOSED;
+            let is_the_cause =
+                |without: Tried| best.cost - now.cost < decisions::RIVAL_LEAVES * (without.cost - now.cost);
+            if as_well {
                 now = best;
+            } else if self.lacking(&now, &free).is_some_and(is_the_cause) {
+                now = best;
+                taken.extend(free);
             }
         }
-        now
+        (now, taken)
+    }
+
+    /// The free terms, of those that effects of a model may have taken the place of, that are needed beside it; and the model with them.
+    fn with_what_is_left(&self, now: &Tried, free: &[usize]) -> (Vec<usize>, Tried) {
+        let columns = self.around.columns;
+        let (mut beside, mut whole) = (Vec::new(), now.clone());
+        for site in Site::ALL {
+            let here = |t: &usize| columns.of_site(site).any(|c| columns.term_of_flexible(c) == *t);
+            let lacks: Vec<usize> =
+                free.iter().copied().filter(|t| here(t) && whole.chosen[*t] == 0).collect();
+            let is_here = |i: &usize| columns.effects[i - FIRST].spec().sites.contains(&site);
+            if lacks.is_empty() || !self.effects(now, true).iter().any(is_here) {
+                continue;
+            }
+            let mut chosen = whole.chosen.clone();
+            lacks.iter().for_each(|&t| chosen[t] = 1);
+            let tried = self.fitted(chosen, whole.place());
+            if let Some(tried) = tried.filter(|t| 1.0 - t.cost / whole.cost >= decisions::LEAST_CLOSED) {
+                beside.extend(lacks);
+                whole = tried;
+            }
+        }
+        (beside, whole)
     }
 
     /// The effects that a model lacks, those first of which the linearisation promises most in a configuration with it.
