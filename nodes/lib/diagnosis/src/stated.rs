@@ -318,11 +318,10 @@ impl Asked<'_, '_, '_, '_> {
             let tried = promised.into_par_iter().filter_map(|i| self.fitted(swapped(i), now.place()));
             let Some(best) = tried.min_by(|a, b| a.cost.total_cmp(&b.cost)) else { continue };
             let as_well = 1.0 - now.cost / best.cost < decisions::LEAST_CLOSED;
-            let is_the_cause =
-                |without: Tried| best.cost - now.cost < decisions::RIVAL_LEAVES * (without.cost - now.cost);
+            let does_most = |neither: Tried| does_most_of(neither.cost, best.cost, now.cost);
             if as_well {
                 now = best;
-            } else if self.lacking(&now, &free).is_some_and(is_the_cause) {
+            } else if self.lacking(&now, &free).is_some_and(does_most) {
                 now = best;
                 taken.extend(free);
             }
@@ -484,6 +483,12 @@ fn of_an_effect(effect: EffectId, closes: f64, log_odds: f64) -> f64 {
     if needless { f64::NEG_INFINITY } else { log_odds }
 }
 
+/// Whether an effect does so much of what free terms do that it is the cause and not something like it: from the costs with neither, with the effect and with
+/// the terms.
+fn does_most_of(neither: f64, effect: f64, free: f64) -> bool {
+    effect - free < decisions::RIVAL_LEAVES * (neither - free)
+}
+
 /// Which effects are asked for by a fit, in this order, from the costs that looks at them ended with, in the order of their promise, and the cost without any
 /// of them: the likely ones, the best first, then those whose look went astray.
 fn to_be_fitted(looks: &[(usize, f64)], without: f64, is_likely: impl Fn(f64) -> bool) -> Vec<usize> {
@@ -504,6 +509,15 @@ mod tests {
         assert_eq!(of_an_effect(EffectId::SteeringRateLimit, 0.05, 30.0), 30.0);
         // A small size may be known well.
         assert_eq!(of_an_effect(EffectId::GyroBias, 0.004, 30.0), 30.0);
+    }
+
+    #[test]
+    fn an_effect_that_leaves_a_tenth_of_what_free_terms_explain_is_the_cause_and_one_that_leaves_a_fifth_is_not()
+     {
+        assert!(does_most_of(1000.0, 190.0, 100.0));
+        assert!(!does_most_of(1000.0, 280.0, 100.0));
+        // Nor one beside terms that explain nothing.
+        assert!(!does_most_of(100.0, 100.0, 100.0));
     }
 
     #[test]
