@@ -48,8 +48,8 @@ pub(crate) struct DiagnoseArgs {
     /// others is said.
     #[arg(long, requires = "bag2", conflicts_with_all = ["later", "heldout", "simulator", "simulator_bag", "predictions"])]
     same_state: bool,
-    /// A later drive of the same car: what has changed from BAG to it. One motion recorded twice (a bag and its copy with a signal processed anew, one
-    /// series of commands played again) is compared sample by sample.
+    /// A later drive of the same car: what has changed from BAG to it. One motion recorded twice (a bag and its copy with a signal processed anew)
+    /// is compared sample by sample.
     #[arg(long, value_name = "BAG", conflicts_with_all = ["bag2", "pacejka", "extended_model"])]
     later: Option<PathBuf>,
     /// Another drive of the car in the same state, to score on; without it every fourth block is held out.
