@@ -105,6 +105,11 @@ fn runs<'a>(rows: &'a [Row], car: &str, variant: Variant) -> Vec<Driven<'a>> {
     runs
 }
 
+/// As a percentage; a dash where the true tires were not driven.
+fn behind_percent(share: f64) -> String {
+    if share.is_finite() { format!("{:+.1} %", 100.0 * share) } else { "-".to_owned() }
+}
+
 /// Lap times against the true tires' on the same track, road and seed, and how well the line was kept.
 pub(crate) fn summary(rows: &[Row]) -> String {
     let laps = rows.iter().map(|r| r.lap).max().unwrap_or(0);
@@ -122,7 +127,8 @@ pub(crate) fn summary(rows: &[Row]) -> String {
             let same = |t: &&Driven<'_>| t.0[0].same_place(&first.car, &first.track, first.mu, first.seed);
             truth.iter().find(same).and_then(|t| t.lap(lap)).map_or(f64::NAN, |l| l.time_s)
         };
-        let _ = writeln!(text, "## {car}: {} runs a variant\n", truth.len());
+        let most = Variant::ALL.map(|variant| runs(rows, car, variant).len()).into_iter().max();
+        let _ = writeln!(text, "## {car}: {} runs a variant\n", most.unwrap_or(0));
         let heads: String = (1..=laps).map(|n| format!(" lap {n} |")).collect();
         let _ = writeln!(
             text,
@@ -145,8 +151,8 @@ pub(crate) fn summary(rows: &[Row]) -> String {
                         )
                     } else {
                         format!(
-                            " {:+.1} % |",
-                            100.0 * median(driven.iter().map(|d| behind(d, lap)).collect())
+                            " {} |",
+                            behind_percent(median(driven.iter().map(|d| behind(d, lap)).collect()))
                         )
                     }
                 })
@@ -172,7 +178,7 @@ pub(crate) fn summary(rows: &[Row]) -> String {
                 let [(third, far_third), (fifth, far_fifth)] = asked;
                 [
                     format!("{third}, {fifth} of {}", driven.len()),
-                    format!("{:+.1} %, {:+.1} %", 100.0 * far_third, 100.0 * far_fifth),
+                    format!("{}, {}", behind_percent(far_third), behind_percent(far_fifth)),
                 ]
             };
             let exits = |first: bool| all().filter(|r| (r.lap == 1) == first).map(|r| r.exits).sum::<u32>();
