@@ -335,7 +335,7 @@ mod tests {
         assert!(TURNS.turns_over_at(&own, &forces(&own)).is_some());
         assert_eq!(TURNS.turns_over_at(&found, &forces(&own)), None);
         assert_eq!(TURNS.turns_over_at(&handed_on, &forces(&handed_on)), None);
-        // Little is lost of the promise, none of what was shown is exceeded, and the stiffness stays in its interval.
+        // Little is lost of the promise, what was shown is hardly exceeded anywhere, and the stiffness stays in its interval.
         assert!((0.85..1.0).contains(&(promise(&handed_on) / promise(&own))));
         let ratio = |f: fn(&MagicFormula) -> f64| {
             [(handed_on.front, found.front), (handed_on.rear, found.rear)]
