@@ -6,7 +6,7 @@
 # --experiment controllers: pursuit and predictive control beside each other, on the true tires; OUT/controllers.csv, a row a run.
 # --controller mpc: predictive control steers in the other experiments; a folder holds the runs of one.
 # --experiment picture: OUT/laps.svg, the picture of README.
-# Writes OUT/laps.csv (a row a lap) and OUT/summary.md, which also goes to standard output. --quick: minutes instead of an hour.
+# Writes OUT/laps.csv (a row a lap) and OUT/summary.md, which also goes to standard output. --quick: minutes instead of an hour, and a run drawn (OUT/laps.svg).
 # What these hold already is not driven again: a run that was broken off goes on.
 set -euo pipefail
 out=${1:?usage: launch_scripts/closed_loop.sh OUT [--quick]}

@@ -12,6 +12,8 @@ pub(crate) struct Counts {
     pub(crate) refused: u64,
     /// Pictures left out because a newer one was waiting, or had been read.
     pub(crate) dropped: u64,
+    /// Pictures left out because they followed the last one read too closely to show another road.
+    pub(crate) left_out: u64,
 }
 
 /// What the state is judged by.
@@ -53,11 +55,12 @@ pub(crate) fn status(facts: &Facts<'_>) -> Status {
     } else {
         (Level::Ok, "reading the road".to_owned())
     };
-    let Counts { read, refused, dropped } = facts.counts;
+    let Counts { read, refused, dropped, left_out } = facts.counts;
     let status = Status::new(level, text)
         .value("pictures read", read)
         .value("pictures refused", refused)
         .value("pictures dropped for newer ones", dropped)
+        .value("pictures left out as the same road", left_out)
         .value("lessons from the tires", facts.lessons)
         .value("calibration", facts.calibration)
         .value("longest time for a picture [ms]", format!("{:.1}", facts.longest_ms));

@@ -3,6 +3,7 @@
 mod diagnostics;
 mod lesson;
 mod node;
+mod pace;
 mod settings;
 
 fn main() -> anyhow::Result<()> {

@@ -19,6 +19,7 @@ use tokio::time::MissedTickBehavior;
 
 use crate::diagnostics::{Counts, Facts, status};
 use crate::lesson::lesson;
+use crate::pace::Pace;
 use crate::settings::{self, Learning};
 
 /// Age from which a picture is late: several times what transport takes.
@@ -69,6 +70,7 @@ pub(crate) fn setup(node: &mut Node) -> anyhow::Result<impl Future<Output = anyh
         taught: None,
         counts: Counts::default(),
         seen: Counts::default(),
+        pace: configuration.pace,
         last: None,
         frame_id: String::new(),
         longest_ms: 0.0,
@@ -171,6 +173,7 @@ struct State {
     counts: Counts,
     /// The counts when the state was last reported.
     seen: Counts,
+    pace: Pace,
     last: Option<Estimate>,
     frame_id: String,
     longest_ms: f64,
@@ -202,9 +205,13 @@ impl State {
         }
     }
 
-    /// Reads a picture and publishes what it says.
+    /// Reads a picture and publishes what it says; one that follows the last too closely shows the same road and is left out.
     async fn take(&mut self, header: Header, data: FrameData<'_>) {
         let stamp_ns = decode::stamp_ns(header.stamp);
+        if !self.pace.is_due(stamp_ns) {
+            self.counts.left_out += 1;
+            return;
+        }
         let now_ns = decode::stamp_ns(self.clock.now());
         let motion = Motion { distance_m: self.odometer.at(stamp_ns) };
         let started = Instant::now();

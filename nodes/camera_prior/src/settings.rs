@@ -9,6 +9,8 @@ use gripsight_friction::{
 };
 use gripsight_runtime::{Descriptor, Node};
 
+use crate::pace::Pace;
+
 /// What the parameters say, files read.
 pub(crate) struct Configuration {
     pub(crate) settings: Settings,
@@ -18,6 +20,7 @@ pub(crate) struct Configuration {
     /// Picture topics to subscribe to: `both`, `raw`, `compressed` or `none`.
     pub(crate) input: String,
     pub(crate) publish_region: bool,
+    pub(crate) pace: Pace,
     /// What the track has taught before.
     pub(crate) calibration: Option<Calibration>,
     pub(crate) learning: Learning,
@@ -186,6 +189,13 @@ pub(crate) fn declare(node: &mut Node) -> anyhow::Result<Configuration> {
             )?,
         },
     };
+    let least_interval_s = number(
+        "least_interval_s",
+        0.075,
+        "Least time between two pictures that are read: one that comes sooner shows the same road; 0 reads each [s]",
+        0.0,
+        10.0,
+    )?;
     let publish_region =
         Descriptor::new("Publish what the network sees on ~/region/compressed, once a second").read_only();
     let publish_region = node.parameter("publish_region", false, publish_region)?.get();
@@ -199,7 +209,16 @@ pub(crate) fn declare(node: &mut Node) -> anyhow::Result<Configuration> {
         "none" => Ok(None),
         _ => models(library.as_deref(), model.as_deref(), beside).map(Some),
     };
-    Ok(Configuration { settings, basis, models, input, publish_region, calibration, learning })
+    Ok(Configuration {
+        settings,
+        basis,
+        models,
+        input,
+        publish_region,
+        pace: Pace::new(least_interval_s),
+        calibration,
+        learning,
+    })
 }
 
 /// What the track has taught before, and how it goes on. A track's own file comes before the one that `calibration` names.

@@ -159,7 +159,9 @@ fn after_a_slow_picture_the_newest_is_read_and_those_that_waited_are_not() {
     let domain = Domain::new();
     let listener = listen(&domain, &python, FRICTION, FrictionPrior::TYPE, "reliable");
     let diagnostics = listen(&domain, &python, "/diagnostics", DiagnosticArray::TYPE, "reliable");
-    let _node = node(&domain, "camera_prior", &["-p", &library, "-p", &model]);
+    // Each picture is read: the slow one comes between the camera's.
+    let each = ["-p", &library, "-p", &model, "-p", "least_interval_s:=0.0"];
+    let _node = node(&domain, "camera_prior", &each);
     let topic = ["publish", "/image/compressed", CompressedImage::TYPE, "--qos", "sensor", "--stamp"];
     let publish = |more: &[&str]| start_cyclone(&domain, &python, &[&topic[..], more].concat());
     let mut camera = publish(&["--period", "0.02", "--times", "2000"]);

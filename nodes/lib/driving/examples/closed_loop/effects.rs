@@ -389,12 +389,12 @@ fn summary(rows: &[Row]) -> String {
                 let late = || all().filter(|r| r.lap >= COUNT);
                 let _ = writeln!(
                     text,
-                    "| {} | {} | {runs} | {:.3} | {:.3} | {:.2} | {} | {} | {} | {} |",
+                    "| {} | {} | {runs} | {} | {} | {} | {} | {} | {} | {} |",
                     wrong.name(),
                     knows.name(),
-                    mean(late().map(|r| r.error_m)),
-                    late().map(|r| r.worst_m).fold(0.0, f64::max),
-                    mean(late().map(|r| r.time_s)),
+                    cell(mean(late().map(|r| r.error_m)), 3),
+                    cell(late().map(|r| r.worst_m).fold(f64::NAN, f64::max), 3),
+                    cell(mean(late().map(|r| r.time_s)), 2),
                     all().map(|r| r.exits).sum::<u32>(),
                     all().filter(|r| !r.wreck.is_empty() || r.lap == 0).count(),
                     all().filter(|r| r.ratio.is_some()).count(),
@@ -405,4 +405,9 @@ fn summary(rows: &[Row]) -> String {
         text.push('\n');
     }
     text
+}
+
+/// A figure of the laps counted; a dash where no run came to them.
+fn cell(value: f64, digits: usize) -> String {
+    if value.is_finite() { format!("{value:.digits$}") } else { "-".to_owned() }
 }

@@ -51,7 +51,7 @@ struct Arguments {
     /// What is driven for
     #[arg(long, value_enum, default_value = "laps")]
     experiment: Experiment,
-    /// One track, one friction, the 1:10 car, two seeds
+    /// One track, one friction, the 1:10 car, two seeds; laps are drawn, too
     #[arg(long)]
     quick: bool,
     /// Cars
@@ -126,6 +126,9 @@ fn main() -> Result<()> {
     };
     std::fs::write(arguments.out.join("summary.md"), &summary)?;
     print!("{summary}");
+    if arguments.quick && arguments.experiment == Experiment::Laps {
+        print!("\n{}", picture::experiment(&arguments)?);
+    }
     Ok(())
 }
 

@@ -196,7 +196,41 @@ pub(crate) fn summary(rows: &[Row]) -> String {
         }
         text.push('\n');
         text.push_str(&growth(rows, car));
+        text.push_str(&prices(rows, car, laps));
     }
+    text
+}
+
+/// What a prior may cost of the last lap's time beside driving without one.
+const PRICE: f64 = 0.02;
+
+/// What a prior, right or wrong, costs in the last lap.
+fn prices(rows: &[Row], car: &str, laps: usize) -> String {
+    let mut text = String::new();
+    let without = runs(rows, car, Variant::NoPrior);
+    for variant in [Variant::Prior, Variant::LieHigh, Variant::LieLow] {
+        let price = |d: &Driven<'_>| {
+            let first = d.0[0];
+            let same = |o: &&Driven<'_>| o.0[0].same_place(&first.car, &first.track, first.mu, first.seed);
+            let other = without.iter().find(same)?;
+            Some(d.lap(laps - 1)?.time_s / other.lap(laps - 1)?.time_s - 1.0)
+        };
+        let prices: Vec<f64> = runs(rows, car, variant).iter().filter_map(price).collect();
+        if prices.is_empty() {
+            continue;
+        }
+        let _ = writeln!(
+            text,
+            "{}: lap {laps} against `identified`: {} in the median, more than {:.0} % slower in {} of {} runs, {} at most.",
+            variant.name(),
+            behind_percent(median(prices.clone())),
+            100.0 * PRICE,
+            prices.iter().filter(|&&price| price > PRICE).count(),
+            prices.len(),
+            behind_percent(prices.iter().copied().fold(f64::NEG_INFINITY, f64::max)),
+        );
+    }
+    text.push('\n');
     text
 }
 
