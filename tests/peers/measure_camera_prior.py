@@ -1,12 +1,13 @@
 """Measures the node camera_prior against a CycloneDDS publisher: CPU a frame, latency from stamp to prior, frames dropped.
 
-    measure_camera_prior.py BINARY PICTURE (raw|jpeg) [--frames 300] [--rate 30]
+    measure_camera_prior.py BINARY PICTURE (raw|jpeg) [--frames 300] [--rate 30] [--speed 10] [--set NAME:=VALUE ...]
 
 PICTURE is a usable road picture, a binary PPM (P6) for raw, else a JPEG. Every frame
-differs in one byte (raw) or in bytes behind the end marker (JPEG), as a live camera's frames do. CPU: user and system time of
+differs in its last bytes, with JPEG behind the end marker, as a live camera's frames do. CPU: user and system time of
 the node's process between the first and the last frame, from /proc, over the frames sent; it includes receiving them. A
 prior carries its picture's stamp, so frames that yield no prior are counted as lost or dropped; the node's diagnostics say
-which. Latency: this process's clock at the stamp and at the arrival of the prior, so the publisher's own writing time counts.
+which. --speed sends odometry of a car that drives so fast, m/s, 50 times a second. Latency: this process's clock at the
+stamp and at the arrival of the prior, so the publisher's own writing time counts.
 """
 
 import argparse
@@ -24,6 +25,8 @@ from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
+# Bytes that change from frame to frame: more than the node leaves out where it looks for a frozen camera, fewer than hide a JPEG's end.
+CHANGED = {"raw": 64, "jpeg": 32}
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
@@ -43,7 +46,7 @@ def message(form, path):
         sample = {"header": header, "height": height, "width": width, "encoding": "rgb8", "step": 3 * width}
         topic = "rt/image"
     else:
-        kind, data = struct("sensor_msgs", "CompressedImage"), path.read_bytes() + bytes(4)
+        kind, data = struct("sensor_msgs", "CompressedImage"), path.read_bytes() + bytes(CHANGED[form])
         sample, topic = {"header": header, "format": "jpeg"}, "rt/image/compressed"
     head = build(kind, sample).serialize()
     # The empty sequence's length is the last word: the bytes follow it.
@@ -66,11 +69,14 @@ def main():
     parser.add_argument("form", choices=["raw", "jpeg"])
     parser.add_argument("--frames", type=int, default=300)
     parser.add_argument("--rate", type=float, default=30.0)
+    parser.add_argument("--speed", type=float, help="send odometry of a car that drives so fast, m/s")
+    parser.add_argument("--set", action="append", default=[], metavar="NAME:=VALUE", help="a parameter of the node")
     args = parser.parse_args()
     model = ROOT / "nodes/camera_prior/model/road_mobilenet_v3_small.onnx"
     library = ROOT / ".deps/onnxruntime/libonnxruntime.so"
     settings = {"input": "raw" if args.form == "raw" else "compressed", "model": model, "onnxruntime_library": library}
     parameters = [part for name, value in settings.items() for part in ("-p", f"{name}:={value}")]
+    parameters += [part for setting in args.set for part in ("-p", setting)]
     node = subprocess.Popen([args.binary, "--ros-args", *parameters], stderr=subprocess.DEVNULL)
     participant = DomainParticipant(int(os.environ.get("ROS_DOMAIN_ID", 0)))
     kind, topic, frame = message(args.form, args.picture)
@@ -78,7 +84,16 @@ def main():
     writer = DataWriter(participant, Topic(participant, topic, kind), qos("sensor"))
     prior = struct("gripsight_msgs", "FrictionPrior")
     reader = DataReader(participant, Topic(participant, "rt/camera_prior/friction", prior), qos("reliable"))
+    odometry = struct("nav_msgs", "Odometry")
+    driven = DataWriter(participant, Topic(participant, "rt/odom", odometry), qos("sensor"))
     sample, sent, heard, running = build(kind, None), {}, {}, True
+
+    def drive():
+        while running:
+            now = time.time()
+            header = {"stamp": {"sec": int(now), "nanosec": int(now % 1 * 1e9)}, "frame_id": "odom"}
+            driven.write(build(odometry, {"header": header, "twist": {"twist": {"linear": {"x": args.speed}}}}))
+            time.sleep(0.02)
 
     def listen():
         while running:
@@ -91,6 +106,8 @@ def main():
             time.sleep(0.05)
         listener = threading.Thread(target=listen)
         listener.start()
+        if args.speed is not None:
+            threading.Thread(target=drive).start()
         time.sleep(1.5)
         before, idle = cpu_s(node.pid), time.monotonic()
         time.sleep(2.0)
@@ -103,7 +120,7 @@ def main():
             now = time.time()
             stamp = (int(now), int(now % 1 * 1e9))
             binary.pack_into("<iI", frame, 4, *stamp)
-            frame[-1 - 3 * (index % 7)] ^= 1 + index % 3
+            frame[-CHANGED[args.form] :] = index.to_bytes(8, "little") * (CHANGED[args.form] // 8)
             if index >= warm:
                 sent[stamp] = now
             writer.write(sample)

@@ -102,7 +102,9 @@ fn decode_compressed(bytes: &[u8], region: &Region) -> Result<RgbPicture, Fricti
         ImageFormat::Png => b"IEND",
         other => return Err(undecodable(format!("expected JPEG or PNG, got {other:?}"))),
     };
-    let tail = &bytes[bytes.len().saturating_sub(64)..];
+    // Some cameras fill their buffer up with zeros.
+    let filled = bytes.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
+    let tail = &bytes[filled.saturating_sub(64)..filled];
     if !tail.windows(end.len()).any(|w| w == end) {
         return Err(FrictionError::Truncated { bytes: bytes.len() });
     }

@@ -8,7 +8,7 @@ use crate::estimate::Estimate;
 
 /// Least distance between two pictures that are kept, metres, least time, and that where no distance is known, nanoseconds.
 const STEP_M: f64 = 1.0;
-const LEAST_STEP_NS: i64 = 100_000_000;
+const LEAST_STEP_NS: i64 = 200_000_000;
 const STEP_NS: i64 = 300_000_000;
 /// How long pictures are kept, nanoseconds.
 const KEPT_NS: i64 = 180_000_000_000;
@@ -20,7 +20,7 @@ const MOST_EXAMPLES: usize = 160;
 const HARD: f64 = 0.5;
 const GRAVITY_MPS2: f64 = 9.81;
 
-/// Whether two pictures, each at a stamp and a distance, show the same road: the same metre, or that of the same tenth of a second.
+/// Whether two pictures, each at a stamp and a distance, show the same road: the same metre, or that of the same fifth of a second.
 pub(crate) fn is_near(now: (i64, Option<f64>), then: (i64, Option<f64>)) -> bool {
     let apart_ns = (now.0 - then.0).abs();
     match now.1.zip(then.1) {
