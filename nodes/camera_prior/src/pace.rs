@@ -1,4 +1,6 @@
 //! Which pictures are read: a camera sends more of them than the road has to show.
+//!
+//! Ten to thirteen a second, from a camera of 25, 30 or 60: a surface that changes is to be half seen within 0.5 s, and the average is one over road.
 
 /// Leaves out pictures that follow the last one read too closely to show another road.
 #[derive(Debug)]

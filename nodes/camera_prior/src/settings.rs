@@ -194,7 +194,8 @@ pub(crate) fn declare(node: &mut Node) -> anyhow::Result<Configuration> {
         0.075,
         "Least time between two pictures that are read: one that comes sooner shows the same road; 0 reads each [s]",
         0.0,
-        10.0,
+        // Once a second none that was read means that none arrives.
+        0.5,
     )?;
     let publish_region =
         Descriptor::new("Publish what the network sees on ~/region/compressed, once a second").read_only();

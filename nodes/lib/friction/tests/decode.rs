@@ -146,10 +146,11 @@ fn a_png_comes_back_exactly_and_a_jpeg_nearly() {
 #[test]
 fn a_jpeg_in_a_buffer_filled_up_with_zeros_is_read_and_one_cut_off_there_is_not() {
     let mut bytes = jpeg();
+    let half = bytes.len() / 2;
     let whole = decode(&FrameData::Compressed(&bytes), &Region::WHOLE).unwrap();
     bytes.extend([0; 4096]);
     assert_eq!(decode(&FrameData::Compressed(&bytes), &Region::WHOLE).unwrap().data, whole.data);
-    bytes[whole.data.len().min(300)..].fill(0);
+    bytes[half..].fill(0);
     let error = decode(&FrameData::Compressed(&bytes), &Region::WHOLE).unwrap_err();
     assert!(matches!(error, FrictionError::Truncated { .. }), "{error}");
 }
