@@ -1,13 +1,14 @@
 """Measures the node camera_prior against a CycloneDDS publisher: CPU a frame, latency from stamp to prior, frames dropped.
 
-    measure_camera_prior.py BINARY PICTURE (raw|jpeg) [--frames 300] [--rate 30] [--speed 10] [--set NAME:=VALUE ...]
+    measure_camera_prior.py BINARY PICTURE (raw|jpeg) [--frames 300] [--rate 30] [--speed 10] [--then PICTURE] [--set NAME:=VALUE ...]
 
 PICTURE is a usable road picture, a binary PPM (P6) for raw, else a JPEG. Every frame
 differs in its last bytes, with JPEG behind the end marker, as a live camera's frames do. CPU: user and system time of
 the node's process between the first and the last frame, from /proc, over the frames sent; it includes receiving them. A
 prior carries its picture's stamp, so frames that yield no prior are counted as lost or dropped; the node's diagnostics say
 which. --speed sends odometry of a car that drives so fast, m/s, 50 times a second. Latency: this process's clock at the
-stamp and at the arrival of the prior, so the publisher's own writing time counts.
+stamp and at the arrival of the prior, so the publisher's own writing time counts. --then: from the middle on the camera sees this road; how long mu takes for
+half and for 90 % of the way between what it was before and what it is in the end, from the first stamp of that road to the arrival of the prior.
 """
 
 import argparse
@@ -70,6 +71,7 @@ def main():
     parser.add_argument("--frames", type=int, default=300)
     parser.add_argument("--rate", type=float, default=30.0)
     parser.add_argument("--speed", type=float, help="send odometry of a car that drives so fast, m/s")
+    parser.add_argument("--then", type=pathlib.Path, metavar="PICTURE", help="another road, seen from the middle on")
     parser.add_argument("--set", action="append", default=[], metavar="NAME:=VALUE", help="a parameter of the node")
     args = parser.parse_args()
     model = ROOT / "nodes/camera_prior/model/road_mobilenet_v3_small.onnx"
@@ -80,6 +82,7 @@ def main():
     node = subprocess.Popen([args.binary, "--ros-args", *parameters], stderr=subprocess.DEVNULL)
     participant = DomainParticipant(int(os.environ.get("ROS_DOMAIN_ID", 0)))
     kind, topic, frame = message(args.form, args.picture)
+    frames = [frame, frame if args.then is None else message(args.form, args.then)[2]]
     kind.serialize = lambda self, **_: bytes(frame)
     writer = DataWriter(participant, Topic(participant, topic, kind), qos("sensor"))
     prior = struct("gripsight_msgs", "FrictionPrior")
@@ -117,6 +120,7 @@ def main():
             time.sleep(max(0.0, start + index / args.rate - time.monotonic()))
             if index == warm:
                 cpu, busy = cpu_s(node.pid), time.monotonic()
+            frame = frames[index >= warm + args.frames // 2]
             now = time.time()
             stamp = (int(now), int(now % 1 * 1e9))
             binary.pack_into("<iI", frame, 4, *stamp)
@@ -140,6 +144,21 @@ def main():
     if latency_ms:
         p50, p99 = percentile(latency_ms, 0.5), percentile(latency_ms, 0.99)
         print(f"latency stamp to prior: p50 {p50:.2f} ms, p99 {p99:.2f} ms, most {max(latency_ms):.2f} ms, mean {statistics.mean(latency_ms):.2f} ms")
+    if args.then is not None:
+        told = sorted((arrived, got.mu) for arrived, got in heard.values() if got.valid)
+        changed = list(sent.values())[args.frames // 2]
+        print(followed(told, changed))
+
+
+def followed(told, changed):
+    """How mu follows a road that changes."""
+    before = [mu for arrived, mu in told if arrived < changed][-1]
+    end = told[-1][1]
+    text = f"mu {before:.2f} to {end:.2f}"
+    for share in (0.5, 0.9):
+        there = next(arrived for arrived, mu in told if arrived > changed and (mu - before) / (end - before) >= share)
+        text += f", {100 * share:.0f} % after {there - changed:.2f} s"
+    return text
 
 
 if __name__ == "__main__":
