@@ -27,7 +27,7 @@ fi
 cargo test --workspace --locked --doc --quiet
 
 step "Python: road renderer, warm start, subscribers"
-.venv/bin/python -m pytest -q -p no:cacheprovider nodes/camera_prior/training/test_render.py tests/results/camera_prior nodes/identifier/examples
+.venv/bin/python -m pytest -q -p no:cacheprovider nodes/camera_prior/training/test_render.py tests/results/test_figures.py tests/results/camera_prior nodes/identifier/examples
 
 step "documentation"
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked --quiet
