@@ -225,6 +225,22 @@ fn signals(run: &Identification, outcome: &Outcome, verdict: &mut Verdict) {
     }
 }
 
+/// Slip at which every tire slides, on gravel, too: where no peak shows by then more slip shows none.
+const MOST_PEAK_SLIP_RAD: f64 = 0.6;
+
+/// What shows the peak of an axle that was driven up to a slip and gave so much of its load.
+fn to_the_peak(axle: &str, furthest_rad: f64, height: f64) -> DriveNext {
+    let furthest = furthest_rad.to_degrees();
+    if furthest_rad > MOST_PEAK_SLIP_RAD {
+        return Manoeuvre::MeasureLateralVelocity.because(format!(
+            "every tire slides at the {furthest:.0} degrees of slip that the {axle} tires have here, but the force there is known too badly to show it: look at v_y and \
+             speed where the car is slow or spins, and feed a v_y that is measured"
+        ));
+    }
+    let why = format!("corner harder until the {axle} tires slide (more than {furthest:.1} degrees of slip)");
+    Manoeuvre::CornerHarder.because(why).up_to(HARDER * height * GRAVITY_MPS2)
+}
+
 /// Peaks that were not reached, and priors that have a say there.
 fn peaks(run: &Identification, outcome: &Outcome, verdict: &mut Verdict) {
     let Verdict { against, remarks, drive, .. } = verdict;
@@ -245,7 +261,8 @@ fn peaks(run: &Identification, outcome: &Outcome, verdict: &mut Verdict) {
         if reached {
             continue;
         }
-        let furthest = slip.low.abs().max(slip.high.abs()).to_degrees();
+        let furthest_rad = slip.low.abs().max(slip.high.abs());
+        let furthest = furthest_rad.to_degrees();
         let what = format!(
             "{axle} peak not reached: slip stayed within {furthest:.1} degrees, the force shown is {:.2} of the load",
             shown.height
@@ -268,8 +285,21 @@ fn peaks(run: &Identification, outcome: &Outcome, verdict: &mut Verdict) {
                 format!("{what}; the provisional set rests on the friction prior of {:.2}", prior.mu)
             }
         });
-        let why =
-            format!("corner harder until the {axle} tires slide (more than {furthest:.1} degrees of slip)");
-        drive.push(Manoeuvre::CornerHarder.because(why).up_to(HARDER * shown.height * GRAVITY_MPS2));
+        drive.push(to_the_peak(axle, furthest_rad, shown.height));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nobody_is_asked_for_more_slip_than_any_tire_needs() {
+        let few = to_the_peak("front", 0.1, 0.5);
+        assert_eq!(few.manoeuvre, Manoeuvre::CornerHarder);
+        assert!(few.why.contains("more than 5.7 degrees"), "{}", few.why);
+        let many = to_the_peak("front", 1.1, 0.85);
+        assert_eq!((many.manoeuvre, many.a_y_mps2), (Manoeuvre::MeasureLateralVelocity, None));
+        assert!(many.why.contains("63 degrees"), "{}", many.why);
     }
 }

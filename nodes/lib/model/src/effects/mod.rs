@@ -139,7 +139,10 @@ macro_rules! library {
             )+
         }
 
-        impl EffectId {
+        /// What a car has of an effect at least that every car has, of a size that matters.
+const LEAST_USUAL: f64 = 1e-3;
+
+impl EffectId {
             /// All of the library, in its order.
             pub const ALL: &[Self] = &[$(Self::$variant),+];
 
@@ -303,7 +306,9 @@ impl EffectId {
             let by_unit = (figure.value)(vehicle, null + 1.0) - (figure.value)(vehicle, null);
             Some(sigma / by_unit.abs())
         });
-        stated.or_else(|| self.spec().usual.map(|usual| usual(vehicle, size)))
+        let usual = stated.or_else(|| self.spec().usual.map(|usual| usual(vehicle, size)));
+        // A figure that is stated as nothing (a centre of gravity on the ground: no load transfer) leaves next to nothing.
+        usual.map(|usual| usual.max(LEAST_USUAL * size))
     }
 
     /// Whether it sits in one part of the lap.
@@ -398,5 +403,7 @@ mod tests {
         assert_eq!(EffectId::DriveSplit.usual(&stated, 0.1), Some(0.03));
         assert_eq!(EffectId::BrakeSplit.usual(&stated, 0.1), Some(0.3));
         assert_eq!(EffectId::background().count(), 9);
+        let flat = VehicleParameters { h_cg_m: 0.0, ..VehicleParameters::f1tenth() };
+        assert_eq!(EffectId::LongitudinalLoadTransfer.usual(&flat, 2.0), Some(0.002));
     }
 }

@@ -13,7 +13,7 @@ mod words;
 use serde::Serialize;
 
 use crate::{SignalError, StateSequence};
-use robust::{Slope, ratio, slope, slope_beside};
+use robust::{Slope, ratio, slope, slope_beside, slope_through};
 use spans::Spans;
 
 /// What is compared.
@@ -220,8 +220,8 @@ pub fn cross_check(sequence: &StateSequence) -> Result<Checks, SignalError> {
     if let Some((first, second)) = spans.forward_forces() {
         add(Pair::ForwardAccelerationAndMotion, &first, &second, slope(&first, &second, 0.3));
     }
-    if let Some((change, left, [turned, turning])) = spans.slipping() {
-        let found = slope_beside(&change, &left, &[&turned, &turning], 0.02);
+    if let Some((change, left, [turned, turning, steering])) = spans.slipping() {
+        let found = lateral_slope(&change, &left, &[&turned, &turning], &steering);
         add(Pair::LateralSpeedAndAcceleration, &change, &left, found);
     }
     if let Some((first, second)) = spans.steering() {
@@ -229,6 +229,25 @@ pub fn cross_check(sequence: &StateSequence) -> Result<Checks, SignalError> {
     }
     all.unchecked = unchecked(&all, sequence);
     Ok(all)
+}
+
+/// The change of v_y over what a_y leaves for it. A road's bank and a body that shakes are in a_y and lower the slope of a v_y that is measured; the slope the other
+/// way round is free of them, and both enclose the truth (Frisch 1934). Where these leave it open the steering tells: what it moves, both show.
+fn lateral_slope(change: &[f64], left: &[f64], beside: &[&[f64]], steering: &[f64]) -> Option<Slope> {
+    const LEAST_MPS: f64 = 0.02;
+    let pair = Pair::LateralSpeedAndAcceleration;
+    let direct = slope_beside(change, left, beside, LEAST_MPS)?;
+    let is_low = judged(pair, Some(direct)).disagrees() && (0.0..1.0).contains(&direct.value);
+    if !is_low {
+        return Some(direct);
+    }
+    let reverse = slope_beside(left, change, beside, LEAST_MPS).map(Slope::inverse);
+    let may_be_right = reverse.is_some_and(|reverse| reverse.high + TOLERANCE_V_Y >= 1.0);
+    let by_steering = slope_through(change, left, beside, steering).filter(|slope| {
+        // Only where the two contradict each other has a_y errors that matter (Hausman 1978).
+        may_be_right && slope.low > direct.high && judged(pair, Some(*slope)) == Finding::Agrees
+    });
+    Some(by_steering.unwrap_or(direct))
 }
 
 /// The steering against the curves driven: its sign and unit, and nothing finer, since tires slip.

@@ -75,31 +75,7 @@ pub(super) fn slope_beside(first: &[f64], second: &[f64], beside: &[&[f64]], lea
     let rows: Vec<Vec<f64>> = (0..first.len())
         .map(|i| std::iter::once(second[i]).chain(beside.iter().map(|b| b[i])).chain([1.0]).collect())
         .collect();
-    let usable: Vec<usize> =
-        (0..rows.len()).filter(|&i| first[i].is_finite() && rows[i].iter().all(|v| v.is_finite())).collect();
-    let fit = |kept: &[usize]| -> Option<(Vec<f64>, Vec<f64>)> {
-        let mut weights = vec![1.0; kept.len()];
-        let mut found = solve(&rows, first, kept, &weights)?;
-        for turn in 0..20 {
-            let left: Vec<f64> = kept
-                .iter()
-                .map(|&i| first[i] - rows[i].iter().zip(&found).map(|(a, b)| a * b).sum::<f64>())
-                .collect();
-            let mut sizes: Vec<f64> = left.iter().map(|r| r.abs()).collect();
-            let middle = sizes.len() / 2;
-            let scale = (1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1).max(1e-12);
-            for (weight, r) in weights.iter_mut().zip(&left) {
-                // The first turns go by absolute values, which lead near enough.
-                *weight = if turn < 8 {
-                    scale / r.abs().max(0.1 * scale)
-                } else {
-                    (1.0 - (r / (4.685 * scale)).powi(2)).max(0.0).powi(2)
-                };
-            }
-            found = solve(&rows, first, kept, &weights)?;
-        }
-        Some((found, weights))
-    };
+    let usable = finite(&rows, first);
     // What of the second the others do not explain.
     let others: Vec<Vec<f64>> = rows.iter().map(|r| r[1..].to_vec()).collect();
     let shared = solve(&others, second, &usable, &vec![1.0; usable.len()])?;
@@ -110,16 +86,86 @@ pub(super) fn slope_beside(first: &[f64], second: &[f64], beside: &[&[f64]], lea
     if usable.len() < 20 || (own / usable.len() as f64).sqrt() < least {
         return None;
     }
-    let (found, weights) = fit(&usable)?;
+    let (found, weights) = bisquare(&rows, first, &usable)?;
     let value = found[0];
     let (low, high) = interval(value, usable.len(), |kept| {
         let kept: Vec<usize> = kept.iter().map(|&k| usable[k]).collect();
-        fit(&kept).map(|(f, _)| f[0])
+        bisquare(&rows, first, &kept).map(|(f, _)| f[0])
     })?;
     // Of few points, blocks left out in turn tell too little of the spread: the interval is not narrower than that of independent noise.
     let half = half_width(&rows, first, &usable, &weights, &found)?;
     let (low, high) = (low.min(value - half), high.max(value + half));
     Some(Slope { value, low, high, offset: found[found.len() - 1] })
+}
+
+fn finite(rows: &[Vec<f64>], first: &[f64]) -> Vec<usize> {
+    (0..rows.len()).filter(|&i| first[i].is_finite() && rows[i].iter().all(|v| v.is_finite())).collect()
+}
+
+/// Coefficients and weights of the points.
+fn bisquare(rows: &[Vec<f64>], first: &[f64], kept: &[usize]) -> Option<(Vec<f64>, Vec<f64>)> {
+    let mut weights = vec![1.0; kept.len()];
+    let mut found = solve(rows, first, kept, &weights)?;
+    for turn in 0..20 {
+        let left: Vec<f64> = kept
+            .iter()
+            .map(|&i| first[i] - rows[i].iter().zip(&found).map(|(a, b)| a * b).sum::<f64>())
+            .collect();
+        let mut sizes: Vec<f64> = left.iter().map(|r| r.abs()).collect();
+        let middle = sizes.len() / 2;
+        let scale = (1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1).max(1e-12);
+        for (weight, r) in weights.iter_mut().zip(&left) {
+            // The first turns go by absolute values, which lead near enough.
+            *weight = if turn < 8 {
+                scale / r.abs().max(0.1 * scale)
+            } else {
+                (1.0 - (r / (4.685 * scale)).powi(2)).max(0.0).powi(2)
+            };
+        }
+        found = solve(rows, first, kept, &weights)?;
+    }
+    Some((found, weights))
+}
+
+/// The slope of `first` over `second` by what both owe to a third, with other causes beside them: errors of the second, which lower the slope by least squares,
+/// have no part in it (instrumental variables: Wright 1928; Angrist and Krueger 2001). `None` where the third tells too little of the second.
+pub(super) fn slope_through(
+    first: &[f64],
+    second: &[f64],
+    beside: &[&[f64]],
+    through: &[f64],
+) -> Option<Slope> {
+    /// An F statistic below which an instrument is weak (Staiger and Stock 1997).
+    const STRONG: f64 = 10.0;
+    let rows: Vec<Vec<f64>> = (0..first.len())
+        .map(|i| {
+            [second[i], through[i]].into_iter().chain(beside.iter().map(|b| b[i])).chain([1.0]).collect()
+        })
+        .collect();
+    let usable = finite(&rows, first);
+    let regressors: Vec<Vec<f64>> = rows.iter().map(|r| [&r[..1], &r[2..]].concat()).collect();
+    let others: Vec<Vec<f64>> = rows.iter().map(|r| r[2..].to_vec()).collect();
+    // The instrument beside the others, with the products that the slope is made of, of points weighed by how well the direct slope fits them.
+    let products = |kept: &[usize]| -> Option<(f64, f64, f64)> {
+        let (_, weights) = bisquare(&regressors, first, kept)?;
+        let shared = solve(&others, through, kept, &weights)?;
+        let mut sums = (0.0, 0.0, 0.0);
+        for (&i, w) in kept.iter().zip(&weights) {
+            let own = through[i] - others[i].iter().zip(&shared).map(|(a, b)| a * b).sum::<f64>();
+            sums = (sums.0 + w * own * first[i], sums.1 + w * own * second[i], sums.2 + w * own * own);
+        }
+        Some(sums)
+    };
+    let by = |kept: &[usize]| products(kept).map(|(a, b, _)| a / b);
+    let (product, shared, square) = products(&usable)?;
+    let spread = left_beside(second, &[beside, &[through]].concat())?;
+    if usable.len() < 20 || shared * shared < STRONG * square * spread * spread {
+        return None;
+    }
+    let value = product / shared;
+    let (low, high) =
+        interval(value, usable.len(), |kept| by(&kept.iter().map(|&k| usable[k]).collect::<Vec<_>>()))?;
+    Some(Slope { value, low, high, offset: 0.0 })
 }
 
 /// Half the 90 % interval of the first coefficient of a weighted fit, its noise independent from point to point.

@@ -185,18 +185,20 @@ impl<'a> Spans<'a> {
         })
     }
 
-    /// The change of v_y and what a_y leaves for it; and the turning (an accelerometer's scale, a body's roll) and its change (the unit's place).
-    pub(super) fn slipping(&self) -> Beside<2> {
+    /// The change of v_y and what a_y leaves for it; and the turning (an accelerometer's scale, a body's roll), its change (the unit's place), and that of the
+    /// steering.
+    pub(super) fn slipping(&self) -> Beside<3> {
         let s = self.sequence;
         let rows = self.rows(!s.a_y_mps2.is_empty() && s.has_v_y(), |span| {
             let turning = |k: usize| f64::from(s.v_x_mps[k]) * f64::from(s.yaw_rate_radps[k]);
             let change = |v: &[f32]| f64::from(v[span.1] - v[span.0]);
             let turned = self.integral_of(turning, span);
             let left = self.integral(&s.a_y_mps2, span) - turned;
-            Some([change(&s.v_y_mps), left, turned, change(&s.yaw_rate_radps)])
+            let turning = change(&s.yaw_rate_radps);
+            Some([change(&s.v_y_mps), left, turned, turning, change(&s.steering_rad)])
         })?;
         let column = |j: usize| rows.iter().map(|r| r[j]).collect::<Vec<_>>();
-        Some((column(0), column(1), [column(2), column(3)]))
+        Some((column(0), column(1), [column(2), column(3), column(4)]))
     }
 
     pub(super) fn steering(&self) -> Pairs {

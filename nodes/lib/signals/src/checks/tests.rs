@@ -141,6 +141,28 @@ fn a_body_that_rolls_does_not_speak_against_v_y() {
 }
 
 #[test]
+fn a_banked_road_does_not_speak_against_v_y_where_the_steering_moves_both_alike() {
+    let banked = |s: &mut StateSequence, steers: f32| {
+        for k in 0..N {
+            let t = k as f32 * 0.01;
+            s.steering_rad[k] += steers * s.v_y_mps[k];
+            s.a_y_mps2[k] += 0.1 * (2.9 * t + (0.3 * t).sin()).sin() + 0.1 * (4.1 * t).cos();
+        }
+    };
+    let pair = Pair::LateralSpeedAndAcceleration;
+    let told = with(|s| banked(s, 0.3));
+    assert_eq!(told.of(pair).unwrap().finding, Finding::Agrees, "{told:?}");
+    // Steering that moves nothing of its own tells nothing, and a v_y that is too small stays so.
+    let untold = with(|s| banked(s, 0.0));
+    assert!(untold.of(pair).unwrap().finding.disagrees(), "{untold:?}");
+    let stiff = with(|s| {
+        banked(s, 0.3);
+        scaled(&mut s.v_y_mps, 0.62);
+    });
+    assert!(stiff.of(pair).unwrap().finding.disagrees(), "{stiff:?}");
+}
+
+#[test]
 fn a_late_localisation_agrees() {
     let mut late = honest();
     late.pose_time_s = late.time_s.iter().step_by(3).map(|t| t + 0.06).collect();
