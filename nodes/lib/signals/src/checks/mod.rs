@@ -145,6 +145,9 @@ const TOO_WIDE: f64 = 0.6;
 /// v_y follows an accelerometer or a pose no better than this: a lag of its filter, a unit on a body that pitches and rolls.
 const TOLERANCE_V_Y: f64 = 0.1;
 
+/// Off by more than this, an accelerometer shows another thing than the car's motion, or in another unit: a body's roll adds a fifth at most.
+const USELESS: f64 = 0.5;
+
 /// Spans in a row over which turns are compared.
 const TURN_SPANS: [usize; 3] = [1, 3, 8];
 
@@ -213,15 +216,20 @@ pub fn cross_check(sequence: &StateSequence) -> Result<Checks, SignalError> {
         let found = slope_beside(&by_pose, &by_speed, &[&turned], 0.005).map(Slope::inverse);
         add(Pair::LateralSpeedAndPose, &by_speed, &by_pose, found);
     }
+    let mut shows_turning = true;
     if let Some((force, motion, [turning])) = spans.lateral_forces() {
         let found = slope_beside(&force, &motion, &[&turning], 0.2);
+        let is_useless = |s: Slope| s.high - s.low <= TOO_WIDE && (s.value - 1.0).abs() > USELESS;
+        shows_turning = !found.is_some_and(is_useless);
         add(Pair::LateralAccelerationAndMotion, &force, &motion, found);
     }
     if let Some((first, second)) = spans.forward_forces() {
         add(Pair::ForwardAccelerationAndMotion, &first, &second, slope(&first, &second, 0.3));
     }
     if let Some((change, left, [turned, turning, steering])) = spans.slipping() {
-        let found = lateral_slope(&change, &left, &[&turned, &turning], &steering);
+        // An accelerometer that does not show the turning shows no sideslip.
+        let found =
+            shows_turning.then(|| lateral_slope(&change, &left, &[&turned, &turning], &steering)).flatten();
         add(Pair::LateralSpeedAndAcceleration, &change, &left, found);
     }
     if let Some((first, second)) = spans.steering() {
@@ -334,8 +342,10 @@ fn judged(pair: Pair, found: Option<Slope>) -> Finding {
     if !told {
         return Finding::NotTold;
     }
+    // A unit is a ratio that is known, not one that happens to lie there.
+    let known = high - low <= TOO_WIDE * value.abs();
     if let Some(&(_, signal, probably)) =
-        pair.units().iter().find(|(factor, ..)| near(*factor) || near(-factor))
+        pair.units().iter().find(|(factor, ..)| known && (near(*factor) || near(-factor)))
     {
         Finding::Unit { signal, probably }
     } else if high < 0.0 && low < -0.5 && high > -2.0 {

@@ -80,6 +80,21 @@ fn scales_signs_and_units_are_named() {
 }
 
 #[test]
+fn a_dead_accelerometer_is_said_to_be_dead_and_does_not_speak_against_v_y() {
+    let dead = with(|s| scaled(&mut s.a_y_mps2, 1e-4));
+    let check = dead.of(Pair::LateralAccelerationAndMotion).unwrap();
+    assert!(check.to_string().contains("a_y does not follow v_x times yaw rate"), "{check}");
+    assert_eq!(dead.of(Pair::LateralSpeedAndAcceleration).unwrap().finding, Finding::NotTold);
+    // Of another sensor, which is a tenth of it by chance and as a whole has nothing to do with it: in no unit.
+    let other = with(|s| {
+        let wave = |k: usize| 0.8 * (0.007 * k as f32).sin() + 0.6 * (0.0031 * k as f32).cos();
+        (0..N).for_each(|k| s.a_y_mps2[k] = -0.1 * s.a_y_mps2[k] + wave(k));
+    });
+    let check = other.of(Pair::LateralAccelerationAndMotion).unwrap();
+    assert!(!matches!(check.finding, Finding::Unit { .. }), "{check:?}");
+}
+
+#[test]
 fn a_v_y_that_another_model_made_is_found_out() {
     // Tires 60 % too stiff inside an observer: the slip it gives is too small.
     let stiff = with(|s| scaled(&mut s.v_y_mps, 0.62));

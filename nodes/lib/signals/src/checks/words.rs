@@ -4,6 +4,9 @@ use std::fmt;
 
 use super::{Check, Finding, Pair};
 
+/// Below this share of what it should be a signal is no signal of that.
+const UNRELATED: f64 = 0.2;
+
 impl Pair {
     /// What is compared, in words.
     #[must_use]
@@ -57,6 +60,11 @@ impl fmt::Display for Check {
                 f,
                 "{first} is {:.2} times {second} ({:.2} to {:.2}): not measured, a model or a formula made it",
                 self.ratio, self.low, self.high
+            ),
+            Finding::Scale { factor } if factor.abs() < UNRELATED => write!(
+                f,
+                "{first} does not follow {second} ({factor:.3} times it, {:.3} to {:.3}): a sensor that is dead, of another axis, or another topic's",
+                self.low, self.high
             ),
             _ => {
                 write!(f, "{first} is {:.3} times {second} ({:.3} to {:.3})", self.ratio, self.low, self.high)
