@@ -152,8 +152,10 @@ def main():
 
 def followed(told, changed):
     """How mu follows a road that changes."""
-    before = [mu for arrived, mu in told if arrived < changed][-1]
-    end = told[-1][1]
+    before = next((mu for arrived, mu in reversed(told) if arrived < changed), None)
+    end = told[-1][1] if told else None
+    if None in (before, end) or before == end:
+        return f"mu stays at {end}: no valid prior on one of the roads, or both are read alike"
     text = f"mu {before:.2f} to {end:.2f}"
     for share in (0.5, 0.9):
         there = next(arrived for arrived, mu in told if arrived > changed and (mu - before) / (end - before) >= share)

@@ -146,7 +146,7 @@ const TOO_WIDE: f64 = 0.6;
 const TOLERANCE_V_Y: f64 = 0.1;
 
 /// Off by more than this, an accelerometer shows another thing than the car's motion, or in another unit: a body's roll adds a fifth at most.
-const USELESS: f64 = 0.5;
+const NOT_THE_MOTION: f64 = 0.5;
 
 /// Spans in a row over which turns are compared.
 const TURN_SPANS: [usize; 3] = [1, 3, 8];
@@ -219,7 +219,7 @@ pub fn cross_check(sequence: &StateSequence) -> Result<Checks, SignalError> {
     let mut shows_turning = true;
     if let Some((force, motion, [turning])) = spans.lateral_forces() {
         let found = slope_beside(&force, &motion, &[&turning], 0.2);
-        let is_useless = |s: Slope| s.high - s.low <= TOO_WIDE && (s.value - 1.0).abs() > USELESS;
+        let is_useless = |s: Slope| s.high - s.low <= TOO_WIDE && (s.value - 1.0).abs() > NOT_THE_MOTION;
         shows_turning = !found.is_some_and(is_useless);
         add(Pair::LateralAccelerationAndMotion, &force, &motion, found);
     }

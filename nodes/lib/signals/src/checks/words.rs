@@ -63,8 +63,10 @@ impl fmt::Display for Check {
             ),
             Finding::Scale { factor } if factor.abs() < UNRELATED => write!(
                 f,
-                "{first} does not follow {second} ({factor:.3} times it, {:.3} to {:.3}): a sensor that is dead, of another axis, or another topic's",
-                self.low, self.high
+                "{first} does not follow {second} ({factor:.3} times it, {:.3} to {:.3}): a dead sensor, or another axis; the line `{}: {{topic: ..., field: ...}}` {mapped}, names another",
+                self.low,
+                self.high,
+                self.pair.turned()
             ),
             _ => {
                 write!(f, "{first} is {:.3} times {second} ({:.3} to {:.3})", self.ratio, self.low, self.high)
