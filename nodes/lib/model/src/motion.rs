@@ -4,7 +4,7 @@
 //! over the step, so that a lag of zero is no lag at all and its derivative there is right.
 
 use crate::rollout::Window;
-use gripsight_vehicle::{OwnTires, Real};
+use gripsight_vehicle::{MagicFormula, OwnTires, Real};
 
 use crate::effects::{EffectId, Lagging};
 use crate::flexible::Push;
@@ -23,6 +23,8 @@ pub(crate) struct Mover<'m, 'a, T> {
     /// Its effects with their parameters.
     effects: Vec<(EffectId, &'m [T])>,
     car: &'m Car<T>,
+    /// Yaw inertia that a moment has to turn.
+    turned_kgm2: T,
     axles_at_rest: Axles<T>,
     tires: OwnTires<T>,
     wheels: &'m RoadWheels<T>,
@@ -41,6 +43,33 @@ struct Extra<T> {
     /// Longitudinal acceleration as the springs carry it, at both ends.
     carried_a_x_mps2: [T; 2],
     force: Following,
+}
+
+/// Slip angle of an axle whose wheels are steered by an angle: it moves with the car's v_x, v_y and yaw rate, at a lever ahead (1) or behind (-1) the
+/// centre of gravity.
+fn slip_angle_rad<T: Real>(steer_rad: &T, [v_x, v_y, r]: [&T; 3], (side, lever_m): (f64, &T)) -> T {
+    let course = (v_y.re() + side * r.re() * lever_m.re()) / v_x.re();
+    let by_across = -1.0 / ((1.0 + course * course) * v_x.re());
+    T::chain(
+        steer_rad.re() - course.atan(),
+        [
+            (1.0, steer_rad),
+            (by_across, v_y),
+            (by_across * side * lever_m.re(), r),
+            (by_across * side * r.re(), lever_m),
+            (-by_across * course, v_x),
+        ],
+    )
+}
+
+/// Two forces or moments over what they move, and accelerations beside that.
+fn over<T: Real>([(a, first), (b, second)]: [(f64, &T); 2], moved: &T, beside: [&T; 2]) -> T {
+    let share = 1.0 / moved.re();
+    let own = (a * first.re() + b * second.re()) * share;
+    T::chain(
+        own + beside[0].re() + beside[1].re(),
+        [(a * share, first), (b * share, second), (-own * share, moved), (1.0, beside[0]), (1.0, beside[1])],
+    )
 }
 
 /// The inputs of an instant.
@@ -130,6 +159,7 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
             p,
             effects: model.with_parameters(p).collect(),
             car,
+            turned_kgm2: car.turned_kgm2(),
             axles_at_rest: car.axles_at_rest(),
             tires,
             wheels,
@@ -197,11 +227,12 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         for i in 0..substeps {
             let share = (i as f64 + 0.5) / substeps as f64;
             let middle = Instant { is_middle: true, ..self.instant(k, share, &extra) };
-            let half = [x[0] + rates.v_y_mps2 * (h_s / 2.0), x[1] + rates.yaw_radps2 * (h_s / 2.0)];
+            let on = |from: &T, rate: &T, time_s: f64| T::weighted([(1.0, from), (time_s, rate)]);
+            let half = [on(&x[0], &rates.v_y_mps2, h_s / 2.0), on(&x[1], &rates.yaw_radps2, h_s / 2.0)];
             let there = self.rates(half, &middle, &rates.memory, h_s / 2.0, self.relaxes);
-            *x = [x[0] + there.v_y_mps2 * h_s, x[1] + there.yaw_radps2 * h_s];
-            *speed_mps += there.v_x_mps2 * h_s;
-            *heading_rad += half[1] * h_s;
+            *x = [on(&x[0], &there.v_y_mps2, h_s), on(&x[1], &there.yaw_radps2, h_s)];
+            *speed_mps = on(speed_mps, &there.v_x_mps2, h_s);
+            *heading_rad = on(heading_rad, &half[1], h_s);
             let end = self.instant(k, (i as f64 + 1.0) / substeps as f64, &extra);
             *rates = self.rates(*x, &end, &rates.memory, h_s, self.relaxes);
         }
@@ -319,8 +350,8 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
             jump_rad,
             a_x_mps2,
             carried_a_x_mps2: {
-                let [from, to] = extra.carried_a_x_mps2;
-                from + (to - from) * share
+                let [from, to] = &extra.carried_a_x_mps2;
+                T::weighted([(1.0 - share, from), (share, to)])
             },
             force_x_mps2: extra.force.at_mps2(share, self.substeps().0),
             minutes: (run.time_s(a) + share * run.dt_s) / 60.0,
@@ -366,14 +397,14 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         }
         let front_rad = now.steering_rad + axles.front.steer_rad;
         let steady_rad = [
-            front_rad - ((v_y + r * car.l_f_m) / v_x).atan(),
-            axles.rear.steer_rad - ((v_y - r * car.l_r_m) / v_x).atan(),
+            slip_angle_rad(&front_rad, [&v_x, &v_y, &r], (1.0, &car.l_f_m)),
+            slip_angle_rad(&axles.rear.steer_rad, [&v_x, &v_y, &r], (-1.0, &car.l_r_m)),
         ];
-        let mut jump_rad = T::from(now.jump_rad);
         let mut slip_rad = steady_rad;
+        let relaxation_s = if relaxes { car.relaxation_m / v_x } else { T::from(0.0) };
         if relaxes && h_s > 0.0 {
             let step_s = if now.is_middle { 2.0 * h_s } else { h_s };
-            let lag = Lag::new(step_s, car.relaxation_m / v_x);
+            let lag = Lag::new(step_s, relaxation_s);
             for (i, slip) in slip_rad.iter_mut().enumerate() {
                 let (from, before) = (memory.slip_rad[i], memory.steady_rad[i]);
                 *slip = if now.is_middle {
@@ -385,15 +416,17 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         } else if relaxes {
             slip_rad = memory.slip_rad;
         }
-        if relaxes {
-            jump_rad *= at_once(car.relaxation_m / v_x);
+        let mut front_slip_rad = slip_rad[0];
+        if now.jump_rad != 0.0 {
+            let passed = if relaxes { at_once(relaxation_s) } else { T::from(1.0) };
+            front_slip_rad += passed * now.jump_rad;
         }
-        let force = |axle: &Axle<T>, tire: &gripsight_vehicle::MagicFormula<T>, slip: T| {
-            tire.normalized_force(slip / axle.grip) * axle.grip * axle.usable
+        let force = |axle: &Axle<T>, tire: &MagicFormula<T>, slip: T| {
+            tire.gripping_force(slip, axle.grip, axle.usable)
         };
-        let front_use = force(&axles.front, &self.tires.front, slip_rad[0] + jump_rad);
+        let front_use = force(&axles.front, &self.tires.front, front_slip_rad);
         let rear_use = force(&axles.rear, &self.tires.rear, slip_rad[1]);
-        let (sin, cos) = now.steering_rad.sin_cos();
+        let (sin, cos) = now.steering_rad.re().sin_cos();
         let front_n = front_use * axles.front.carried_n(self.axles_at_rest.front.load_n);
         let rear_n = rear_use * axles.rear.carried_n(self.axles_at_rest.rear.load_n);
         let mut motion = Motion::none();
@@ -407,11 +440,21 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         } else {
             T::from(0.0)
         };
-        let front_y_n = if commanded { front_n * cos + sin * front_x_n } else { front_n * cos };
-        let mut a_y = (rear_n + front_y_n) / car.mass_kg + motion.force_y_mps2 + now.extra.push[0];
-        let mut yaw_radps2 = (front_y_n * car.l_f_m - rear_n * car.l_r_m) / car.turned_kgm2()
-            + motion.yaw_radps2
-            + now.extra.push[1];
+        let across_n = front_n.re() * cos + front_x_n.re() * sin;
+        let turned_n = front_x_n.re() * cos - front_n.re() * sin;
+        let front_y_n =
+            T::chain(across_n, [(cos, &front_n), (sin, &front_x_n), (turned_n, &now.steering_rad)]);
+        let mut a_y = over(
+            [(1.0, &rear_n), (1.0, &front_y_n)],
+            &car.mass_kg,
+            [&motion.force_y_mps2, &now.extra.push[0]],
+        );
+        let moments_nm = [front_y_n * car.l_f_m, rear_n * car.l_r_m];
+        let mut yaw_radps2 = over(
+            [(1.0, &moments_nm[0]), (-1.0, &moments_nm[1])],
+            &self.turned_kgm2,
+            [&motion.yaw_radps2, &now.extra.push[1]],
+        );
         if let Some(flexible) = &model.flexible {
             let own = model.flexible_parameters(self.p);
             let rate = |i: usize| {
@@ -432,8 +475,19 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
             // A command speaks of the car's own acceleration: the wheels' is on top of it, and everything else that pushes has to turn them, too.
             let turning_kg = TURNING_SHARE * car.nominal_mass_kg;
             let commanded_n = now.force_x_mps2 * (car.nominal_mass_kg + turning_kg);
-            let pushed_mps2 = motion.force_x_mps2 + motion.gravity_x_mps2;
-            (-(front_n * sin) + pushed_mps2 * car.mass_kg + commanded_n) / (car.mass_kg + turning_kg)
+            let pushed_mps2 = motion.force_x_mps2.re() + motion.gravity_x_mps2.re();
+            let (mass_kg, moved_kg) = (car.mass_kg.re(), car.mass_kg.re() + turning_kg);
+            let along = (commanded_n + pushed_mps2 * mass_kg - front_n.re() * sin) / moved_kg;
+            T::chain(
+                along,
+                [
+                    (-sin / moved_kg, &front_n),
+                    (-front_n.re() * cos / moved_kg, &now.steering_rad),
+                    (mass_kg / moved_kg, &motion.force_x_mps2),
+                    (mass_kg / moved_kg, &motion.gravity_x_mps2),
+                    ((pushed_mps2 - along) / moved_kg, &car.mass_kg),
+                ],
+            )
         } else {
             motion.gravity_x_mps2 + now.a_x_mps2
         };
@@ -443,9 +497,20 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
             memory.rolled_a_y_mps2
         };
         Rates {
-            v_y_mps2: a_y - now.v_x_mps * r + motion.gravity_y_mps2,
+            v_y_mps2: T::chain(
+                a_y.re() - now.v_x_mps.re() * r.re() + motion.gravity_y_mps2.re(),
+                [
+                    (1.0, &a_y),
+                    (-r.re(), &now.v_x_mps),
+                    (-now.v_x_mps.re(), &r),
+                    (1.0, &motion.gravity_y_mps2),
+                ],
+            ),
             yaw_radps2,
-            v_x_mps2: along_mps2 + v_y * r,
+            v_x_mps2: T::chain(
+                along_mps2.re() + v_y.re() * r.re(),
+                [(1.0, &along_mps2), (r.re(), &v_y), (v_y.re(), &r)],
+            ),
             a_y_mps2: a_y,
             a_x_mps2: along_mps2 - motion.gravity_x_mps2,
             memory: Memory { a_y_mps2: a_y, rolled_a_y_mps2: rolled, front_use, slip_rad, steady_rad },

@@ -130,8 +130,12 @@ impl<T: Real> Axle<T> {
     /// The load as the tire makes use of it: a tire's force grows less than its load does (Pacejka, Tire and Vehicle Dynamics, section 4.3.1,
     /// `p_Dy2`).
     pub fn carried_n(&self, at_rest_n: T) -> T {
-        let more = self.load_n / at_rest_n - 1.0;
-        self.load_n * (-(more * LOAD_SENSITIVITY) + 1.0)
+        let (load_n, share) = (self.load_n.re(), self.load_n.re() / at_rest_n.re());
+        let used = 1.0 - LOAD_SENSITIVITY * (share - 1.0);
+        T::chain(
+            load_n * used,
+            [(used - LOAD_SENSITIVITY * share, &self.load_n), (LOAD_SENSITIVITY * share * share, &at_rest_n)],
+        )
     }
 }
 
@@ -250,30 +254,56 @@ impl<T> Outputs<T> {
 pub(crate) struct Lag<T> {
     h_s: f64,
     tau_s: T,
-    /// exp(-h/tau); nothing where it is nil.
-    decay: Option<T>,
+    /// exp(-h/tau)
+    decay: f64,
+    /// Its derivative by tau, 1/s.
+    decay_by_tau_1ps: f64,
 }
+
+/// A number and its derivatives by others.
+type Derived<const K: usize> = (f64, [f64; K]);
 
 impl<T: Real> Lag<T> {
     pub(crate) fn new(h_s: f64, tau_s: T) -> Self {
-        let slow = tau_s.re() >= h_s / 30.0;
-        Self { h_s, tau_s, decay: slow.then(|| (-(tau_s.recip() * h_s)).exp()) }
+        /// Times tau in a step after which nothing is left of the start.
+        const NIL: f64 = 30.0;
+        let steps = h_s / tau_s.re();
+        let decay = if steps <= NIL { (-steps).exp() } else { 0.0 };
+        let decay_by_tau_1ps = if decay > 0.0 { decay * steps / tau_s.re() } else { 0.0 };
+        Self { h_s, tau_s, decay, decay_by_tau_1ps }
     }
 
     /// The output after a step in which the input goes from `u0` to `u1`.
     pub(crate) fn step(&self, y0: T, u0: T, u1: T) -> T {
-        let ramp = (u1 - u0) / self.h_s * self.tau_s;
-        let settled = u1 - ramp;
-        match self.decay {
-            Some(decay) => settled + (y0 - u0 + ramp) * decay,
-            None => settled,
-        }
+        let (end, [by_y0, by_u0, by_u1, by_tau]) = self.end(y0.re(), u0.re(), u1.re());
+        T::chain(end, [(by_y0, &y0), (by_u0, &u0), (by_u1, &u1), (by_tau, &self.tau_s)])
     }
 
     /// The output on average over the step: where the lag is short, the end of the step does not show that it came late. `middle`: the input halfway.
     pub(crate) fn mean(&self, y0: T, u0: T, middle: T) -> T {
-        let end = self.step(y0, u0, middle * 2.0 - u0);
-        middle - (end - y0) / self.h_s * self.tau_s
+        let share = self.tau_s.re() / self.h_s;
+        let end_of = self.end(y0.re(), u0.re(), 2.0 * middle.re() - u0.re());
+        let (end, [by_y0, by_u0, by_u1, by_tau]) = end_of;
+        let risen = end - y0.re();
+        T::chain(
+            middle.re() - share * risen,
+            [
+                (share * (1.0 - by_y0), &y0),
+                (share * (by_u1 - by_u0), &u0),
+                (1.0 - 2.0 * share * by_u1, &middle),
+                (-share * by_tau - risen / self.h_s, &self.tau_s),
+            ],
+        )
+    }
+
+    /// The output after a step, with its derivatives by y0, u0, u1 and tau.
+    fn end(&self, y0: f64, u0: f64, u1: f64) -> Derived<4> {
+        let (share, rise) = (self.tau_s.re() / self.h_s, u1 - u0);
+        let behind = y0 - u0 + share * rise;
+        let end = u1 - share * rise + behind * self.decay;
+        let gone = 1.0 - self.decay;
+        let by_tau = behind * self.decay_by_tau_1ps - gone * rise / self.h_s;
+        (end, [self.decay, share * gone - self.decay, 1.0 - share * gone, by_tau])
     }
 }
 

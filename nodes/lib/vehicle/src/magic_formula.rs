@@ -27,7 +27,37 @@ impl<T: Real> MagicFormula<T> {
     /// F_y/F_z at a slip angle. Odd, and bounded by D.
     #[must_use]
     pub fn normalized_force(&self, slip_angle_rad: T) -> T {
-        let (b, c, d, e, a) = (self.b.re(), self.c.re(), self.d.re(), self.e.re(), slip_angle_rad.re());
+        let (force, [by_slip, by_b, by_c, by_d, by_e]) = self.derived(slip_angle_rad.re());
+        T::chain(
+            force,
+            [(by_slip, &slip_angle_rad), (by_b, &self.b), (by_c, &self.c), (by_d, &self.d), (by_e, &self.e)],
+        )
+    }
+
+    /// F_y/F_z at a slip angle of a tire with `grip` times the peak and the same stiffness, of which a share is `usable`.
+    #[must_use]
+    pub fn gripping_force(&self, slip_angle_rad: T, grip: T, usable: T) -> T {
+        let (times, share) = (grip.re(), usable.re());
+        let reached_rad = slip_angle_rad.re() / times;
+        let (force, [by_slip, by_b, by_c, by_d, by_e]) = self.derived(reached_rad);
+        let whole = times * share;
+        T::chain(
+            force * times * share,
+            [
+                (by_slip * share, &slip_angle_rad),
+                ((force - by_slip * reached_rad) * share, &grip),
+                (force * times, &usable),
+                (by_b * whole, &self.b),
+                (by_c * whole, &self.c),
+                (by_d * whole, &self.d),
+                (by_e * whole, &self.e),
+            ],
+        )
+    }
+
+    /// F_y/F_z at a slip angle, with its derivatives by that angle, B, C, D and E.
+    fn derived(&self, slip_angle_rad: f64) -> (f64, [f64; 5]) {
+        let (b, c, d, e, a) = (self.b.re(), self.c.re(), self.d.re(), self.e.re(), slip_angle_rad);
         let ba = b * a;
         let bend = ba - ba.atan();
         let z = ba - e * bend;
@@ -36,16 +66,7 @@ impl<T: Real> MagicFormula<T> {
         // By z, and by B a.
         let by_z = d * c * cos / (1.0 + z * z);
         let by_ba = by_z * (1.0 - e + e / (1.0 + ba * ba));
-        T::chain(
-            d * sin,
-            [
-                (by_ba * b, &slip_angle_rad),
-                (by_ba * a, &self.b),
-                (d * u * cos, &self.c),
-                (sin, &self.d),
-                (-by_z * bend, &self.e),
-            ],
-        )
+        (d * sin, [by_ba * b, by_ba * a, d * u * cos, sin, -by_z * bend])
     }
 
     /// Slope at zero slip, B C D, 1/rad: times the load it is the cornering stiffness.

@@ -36,6 +36,13 @@ pub trait Real:
     /// A function with known derivatives: its value, and for each of its arguments the derivative by it.
     fn chain<const K: usize>(value: f64, arguments: [(f64, &Self); K]) -> Self;
 
+    /// A sum of numbers, each times a constant.
+    #[inline]
+    fn weighted<const K: usize>(terms: [(f64, &Self); K]) -> Self {
+        let value = terms.iter().map(|(factor, term)| factor * term.re()).sum();
+        Self::chain(value, terms)
+    }
+
     /// 1/x.
     #[inline]
     fn recip(self) -> Self {
@@ -112,9 +119,10 @@ impl Real for f64 {
 
 /// A value and its derivatives by N quantities.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C, align(32))]
 pub struct Dual<const N: usize> {
-    re: f64,
     derivatives: [f64; N],
+    re: f64,
     /// Whether any derivative may differ from zero: most of a model is constant.
     varies: bool,
 }
