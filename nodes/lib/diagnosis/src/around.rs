@@ -2,7 +2,7 @@
 
 use gripsight_estimation::Windows;
 use gripsight_estimation::selection::{Quadratic, Term, configuration};
-use gripsight_estimation::shooting::{self, Parameter, Prior, Problem};
+use gripsight_estimation::shooting::{self, Fit, Parameter, Prior, Problem};
 use gripsight_model::{BASE, EffectId, ExtendedModel, Site};
 use nalgebra::{DMatrix, DVector};
 
@@ -42,6 +42,13 @@ pub(crate) struct Around<'p, 'a> {
 pub(crate) struct Refined {
     pub(crate) values: Vec<f64>,
     pub(crate) starts: Vec<[f64; 2]>,
+}
+
+/// How a fit of a configuration ended.
+pub(crate) struct Ended {
+    pub(crate) fitted: Refined,
+    /// In the order of the model's own parameters.
+    pub(crate) fit: Fit,
 }
 
 /// A column that a configuration's model has, with its prior there.
@@ -86,7 +93,7 @@ impl Around<'_, '_> {
     /// A configuration fitted by rollouts, between two linearisations.
     pub(crate) fn by_rollouts(&self, problem: &Quadratic, chosen: &[usize]) -> Option<Refined> {
         let linear = configuration(problem, self.dispersion, self.terms, chosen)?;
-        self.refined(ITERATIONS, chosen, &linear.step, self.places(&linear.step)).map(|(_, fitted)| fitted)
+        self.refined(ITERATIONS, chosen, &linear.step, self.places(&linear.step)).map(|ended| ended.fitted)
     }
 
     /// The same, as far as it goes. `near`: another one that is fitted, and which one; what tells them apart is added by the linearisation.
@@ -95,14 +102,37 @@ impl Around<'_, '_> {
         problem: &Quadratic,
         chosen: &[usize],
         near: Option<(&[usize], &Refined)>,
-    ) -> Option<Refined> {
+    ) -> Option<Ended> {
         let step = configuration(problem, self.dispersion, self.terms, chosen)?.step;
         let near = near.and_then(|near| self.beginnings(near, problem, chosen, &step)).unwrap_or_default();
         let begins = self.places(&step).into_iter().chain(near).collect();
-        let (cost, fitted) = self.refined(ITERATIONS_TO_THE_END, chosen, &step, begins)?;
-        let alone = self.without_alike(chosen, &fitted);
+        let ended = self.refined(ITERATIONS_TO_THE_END, chosen, &step, begins)?;
+        let alone = self.without_alike(chosen, &ended.fitted);
         let alone = alone.and_then(|begin| self.refined(ITERATIONS_TO_THE_END, chosen, &step, vec![begin]));
-        Some(alone.filter(|(alone, _)| *alone < cost).map_or(fitted, |(_, alone)| alone))
+        let cost = |of: &Ended| of.fit.linearization.cost;
+        Some(alone.filter(|alone| cost(alone) < cost(&ended)).unwrap_or(ended))
+    }
+
+    /// A configuration as a look left it.
+    pub(crate) fn there(&self, chosen: &[usize], look: Refined) -> Option<Ended> {
+        self.refined(0, chosen, &DVector::zeros(self.values.len()), vec![look])
+    }
+
+    /// By how much the log evidence would fall without each effect of a fitted configuration, by term, were the problem as linear as it is at the fit (Wald).
+    pub(crate) fn linear_losses(&self, chosen: &[usize], ended: &Ended) -> Option<Vec<(usize, f64)>> {
+        let (_, _, map) = self.model(self.engine, chosen, &ended.fitted.values);
+        let loss = |i: usize| {
+            let effect = self.columns.effects[i];
+            let from = self.columns.of_effect(effect)?.start;
+            let own: Vec<usize> =
+                (from..from + effect.sizing()).filter_map(|c| map.iter().position(|m| *m == c)).collect();
+            let sizes =
+                own.iter().zip(effect.spec().parameters).map(|(&j, p)| ended.fit.parameters[j] - p.null);
+            let sizes = DVector::from_iterator(own.len(), sizes);
+            let known = ended.fit.posterior_of(&own)?.cholesky()?;
+            Some((FIRST + i, 0.5 * sizes.dot(&known.solve(&sizes)) / self.dispersion))
+        };
+        Some((0..self.columns.effects.len()).filter(|&i| chosen[FIRST + i] > 0).filter_map(loss).collect())
     }
 
     /// Where a linearisation leads, and where it was made.
@@ -187,7 +217,7 @@ impl Around<'_, '_> {
         chosen: &[usize],
         step: &DVector<f64>,
         begins: Vec<Refined>,
-    ) -> Option<(f64, Refined)> {
+    ) -> Option<Ended> {
         let Self { engine, columns, terms, values, windows, dispersion, .. } = *self;
         let in_use = self.in_use(chosen);
         let mut target = columns.blank(engine);
@@ -234,12 +264,12 @@ impl Around<'_, '_> {
             tolerance: SETTLED * dispersion / cost,
             ..engine.problem(&model, &windows.windows, &parameters, iterations)
         };
-        let best = shooting::fit(&problem, Some(begin));
-        for (&column, &v) in map.iter().zip(&best.parameters) {
+        let fit = shooting::fit(&problem, Some(begin));
+        for (&column, &v) in map.iter().zip(&fit.parameters) {
             target[column] = v;
         }
-        let cost = best.linearization.cost;
-        cost.is_finite().then_some((cost, Refined { values: target, starts: best.starts }))
+        let fitted = Refined { values: target, starts: fit.starts.clone() };
+        fit.linearization.cost.is_finite().then_some(Ended { fitted, fit })
     }
 
     /// A configuration fitted roughly, for a look, from the linear answer, with the logarithm of its evidence by rollouts, its prior weight counted.
@@ -405,7 +435,7 @@ mod tests {
         const FAR: f64 = 0.3;
         with_around(LAG_S, FAR, |around, problem| {
             let with_lag = configured(around, &[EffectId::SteeringLag]);
-            let fit = around.by_rollouts_to_the_end(problem, &with_lag, None).unwrap();
+            let fit = around.by_rollouts_to_the_end(problem, &with_lag, None).unwrap().fitted;
             let lag = around.columns.of_effect(EffectId::SteeringLag).unwrap().start;
             assert!((fit.values[lag] - LAG_S).abs() < 0.005, "{}", fit.values[lag]);
             let fuller = configured(around, &[EffectId::SteeringLag, EffectId::VyBias]);
@@ -420,15 +450,31 @@ mod tests {
     }
 
     #[test]
+    fn a_fit_tells_by_its_own_derivatives_what_it_surely_needs() {
+        with_around(0.06, 1.0, |around, problem| {
+            let chosen = configured(around, &[EffectId::SteeringLag, EffectId::VyBias]);
+            let ended = around.by_rollouts_to_the_end(problem, &chosen, None).unwrap();
+            let losses = around.linear_losses(&chosen, &ended).unwrap();
+            let of = |effect| {
+                let place = around.columns.effects.iter().position(|e| *e == effect).unwrap();
+                losses.iter().find(|(term, _)| *term == FIRST + place).unwrap().1
+            };
+            assert_eq!(losses.len(), 2);
+            let [lag, bias] = [EffectId::SteeringLag, EffectId::VyBias].map(of);
+            assert!(lag > CLEAR && bias < DOUBTFUL, "{lag} {bias}");
+        });
+    }
+
+    #[test]
     fn a_fit_leads_away_from_where_an_effect_is_absent_and_its_derivative_vanishes() {
         const LAG_S: f64 = 0.06;
         with_around(LAG_S, 1.0, |around, problem| {
             let [nothing, with_limit] =
                 [&[][..], &[EffectId::SteeringRateLimit]].map(|e| configured(around, e));
-            let fit = around.by_rollouts_to_the_end(problem, &nothing, None).unwrap();
+            let fit = around.by_rollouts_to_the_end(problem, &nothing, None).unwrap().fitted;
             assert_eq!(around.stuck(&with_limit, &fit.values), Some(EffectId::SteeringRateLimit));
             let limited =
-                around.by_rollouts_to_the_end(problem, &with_limit, Some((&nothing, &fit))).unwrap();
+                around.by_rollouts_to_the_end(problem, &with_limit, Some((&nothing, &fit))).unwrap().fitted;
             assert_eq!(around.stuck(&with_limit, &limited.values), None);
         });
     }
@@ -437,7 +483,7 @@ mod tests {
     fn a_fit_begins_anew_without_the_little_of_what_does_nearly_the_same() {
         with_around(0.06, 1.0, |around, problem| {
             let [nothing, with_lag] = [&[][..], &[EffectId::SteeringLag]].map(|e| configured(around, e));
-            let mut fit = around.by_rollouts_to_the_end(problem, &with_lag, None).unwrap();
+            let mut fit = around.by_rollouts_to_the_end(problem, &with_lag, None).unwrap().fitted;
             let relaxation = around.columns.of_effect(EffectId::TireRelaxation).unwrap();
             fit.values[relaxation.start] = 0.02;
             let begin = around.without_alike(&with_lag, &fit).unwrap();

@@ -15,7 +15,7 @@ use gripsight_estimation::shooting::{self, Parameter};
 use nalgebra::{DMatrix, DVector};
 use std::sync::OnceLock;
 
-use crate::around::{Around, Refined};
+use crate::around::{Around, Ended};
 use crate::budget::Scorer;
 
 /// Iterations of the fit of start states, and where those of another model are at hand.
@@ -44,12 +44,15 @@ impl Around<'_, '_> {
         terms: &[Term],
         scorer: &Scorer<'_>,
         chosen: &[usize],
-        fitted: &Refined,
+        ended: &Ended,
         starts: &OnceLock<Vec<[f64; 2]>>,
     ) -> f64 {
-        let apart =
-            if scorer.is_apart() { self.cost_apart(scorer, chosen, &fitted.values, starts) } else { 0.0 };
-        apart + self.cost_left_out(terms, chosen, fitted).unwrap_or(f64::NAN)
+        let apart = if scorer.is_apart() {
+            self.cost_apart(scorer, chosen, &ended.fitted.values, starts)
+        } else {
+            0.0
+        };
+        apart + self.cost_left_out(terms, chosen, ended).unwrap_or(f64::NAN)
     }
 
     /// The same on the data held out alone. `starts`: where the first model that was looked at starts there.
@@ -92,15 +95,16 @@ impl Around<'_, '_> {
     }
 
     /// The same of the blocks fitted, each left out once.
-    fn cost_left_out(&self, terms: &[Term], chosen: &[usize], fitted: &Refined) -> Option<f64> {
+    fn cost_left_out(&self, terms: &[Term], chosen: &[usize], Ended { fitted, fit }: &Ended) -> Option<f64> {
         let (model, values, map) = self.model(self.engine, chosen, &fitted.values);
         let own = self.own(terms, chosen, &map, &values);
-        let movable = |o: &Own| Parameter { free: o.precision.is_some(), ..Own::fixed(o.value) };
-        let parameters: Vec<Parameter> = own.iter().map(movable).collect();
-        let problem = self.engine.problem(&model, &self.windows.windows, &parameters, 0);
-        let at = shooting::linearize(&problem, &values, &fitted.starts);
-        let precisions: Vec<f64> = own.iter().filter_map(|o| o.precision).collect();
-        let prior = DMatrix::from_diagonal(&DVector::from_vec(precisions));
+        let parameters: Vec<Parameter> = own.iter().map(|o| Own::fixed(o.value)).collect();
+        let at = &fit.linearization;
+        // What moves: its place in the fit, and its precision.
+        let moving: Vec<(usize, f64)> =
+            fit.free.iter().enumerate().filter_map(|(row, &j)| Some((row, own[j].precision?))).collect();
+        let rows: Vec<usize> = moving.iter().map(|m| m.0).collect();
+        let prior = DMatrix::from_diagonal(&DVector::from_iterator(rows.len(), moving.iter().map(|m| m.1)));
         let blocks: Vec<Block> = self
             .windows
             .block
@@ -108,23 +112,23 @@ impl Around<'_, '_> {
             .scan(0, |from, members| {
                 let windows = *from..*from + members.len();
                 *from = windows.end;
-                let sum = |of: &[DMatrix<f64>]| of[windows.clone()].iter().sum::<DMatrix<f64>>();
-                let gradient = at.window_gradients[windows.clone()].iter().sum();
-                Some(Block { information: sum(&at.window_information), gradient, windows })
+                let information: DMatrix<f64> = at.window_information[windows.clone()].iter().sum();
+                let gradient: DVector<f64> = at.window_gradients[windows.clone()].iter().sum();
+                let information = information.select_rows(&rows).select_columns(&rows);
+                Some(Block { information, gradient: gradient.select_rows(&rows), windows })
             })
             .collect();
         let whole = blocks.iter().fold(prior, |sum, b| sum + &b.information / self.dispersion);
         let without = |block: &Block| {
             let step = block.step(&whole, self.dispersion)?;
-            let mut steps = step.iter();
-            let moved = |o: &Own| {
-                let by = o.precision.and_then(|_| steps.next()).unwrap_or(&0.0);
-                (o.value + by).clamp(o.bounds[0], o.bounds[1])
-            };
-            let values: Vec<f64> = own.iter().map(moved).collect();
-            let taken =
-                own.iter().zip(&values).filter(|(o, _)| o.precision.is_some()).map(|(o, v)| v - o.value);
-            let starts = at.starts_after(&DVector::from_iterator(step.len(), taken), &fitted.starts);
+            let mut values = values.clone();
+            let mut taken = DVector::zeros(fit.free.len());
+            for (&row, by) in rows.iter().zip(step.iter()) {
+                let (j, o) = (fit.free[row], &own[fit.free[row]]);
+                values[j] = (o.value + by).clamp(o.bounds[0], o.bounds[1]);
+                taken[row] = values[j] - o.value;
+            }
+            let starts = at.starts_after(&taken, &fitted.starts);
             let windows = &self.windows.windows[block.windows.clone()];
             let problem = self.engine.problem(&model, windows, &parameters, 0);
             Some(shooting::cost(&problem, &values, &starts[block.windows.clone()]))

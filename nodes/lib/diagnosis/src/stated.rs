@@ -7,13 +7,14 @@ use gripsight_estimation::selection::{Term, configuration};
 use gripsight_model::{EffectId, Site};
 use rayon::prelude::*;
 
-use crate::around::{Around, Refined};
+use crate::around::{Around, Ended, Refined};
 use crate::budget::Scorer;
 use crate::columns::Columns;
 use crate::decisions;
 use crate::discrepancy::Discrepancy;
 use crate::infer::FIRST;
 use crate::joint::Weighed;
+use crate::pruned::CLEAR;
 use crate::statement::Statement;
 
 /// Effects, the likeliest to be taken in and those needed least, that are asked for by a fit and not by a look alone.
@@ -35,6 +36,8 @@ struct Tried {
     fitted: Refined,
     /// Robust sum of squares on data that it was not fitted to.
     cost: f64,
+    /// Its effects, by term, that it surely needs.
+    sure: Vec<usize>,
 }
 
 impl Tried {
@@ -207,24 +210,27 @@ impl Asked<'_, '_, '_, '_> {
             return found;
         }
         let total = &self.weighed.total;
-        let look = self
-            .tried(chosen.clone(), |around, chosen| Some(around.beside(total, chosen, beside.place()?)?.1));
+        let look = self.tried(chosen.clone(), |around, chosen| {
+            around.there(chosen, around.beside(total, chosen, beside.place()?)?.1)
+        });
         if look.as_ref().is_some_and(|look| look.cost <= well) {
             return look;
         }
-        let near = self.tried(chosen, |around, chosen| Some(around.nearby(total, chosen)?.1));
+        let near = self.tried(chosen, |around, chosen| around.there(chosen, around.nearby(total, chosen)?.1));
         near.into_iter().chain(look).min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
 
     fn tried(
         &self,
         chosen: Vec<usize>,
-        fit: impl Fn(&Around<'_, '_>, &[usize]) -> Option<Refined>,
+        fit: impl Fn(&Around<'_, '_>, &[usize]) -> Option<Ended>,
     ) -> Option<Tried> {
         let terms = self.around.lacking(&chosen);
-        let fitted = fit(&Around { terms: &terms, ..*self.around }, &chosen)?;
-        let cost = self.around.predictive_cost(&terms, self.scorer, &chosen, &fitted, &self.starts);
-        Some(Tried { chosen, fitted, cost })
+        let ended = fit(&Around { terms: &terms, ..*self.around }, &chosen)?;
+        let cost = self.around.predictive_cost(&terms, self.scorer, &chosen, &ended, &self.starts);
+        let losses = self.around.linear_losses(&chosen, &ended).unwrap_or_default();
+        let sure = losses.into_iter().filter(|(_, loss)| *loss > CLEAR).map(|(term, _)| term).collect();
+        Some(Tried { chosen, fitted: ended.fitted, cost, sure })
     }
 
     /// A configuration without a part of it, fitted nearby.
@@ -406,28 +412,44 @@ impl Asked<'_, '_, '_, '_> {
     /// Takes out the effects that all data make less likely than not, the unlikeliest first; what is left, and that without each effect.
     fn without_unlikely_effects(&self, mut now: Tried) -> (Tried, Vec<(usize, Tried)>) {
         loop {
-            let simpler: Vec<(usize, Tried)> = self
-                .effects(&now, true)
-                .into_par_iter()
-                .filter_map(|i| Some((i, self.lacking(&now, &[i])?)))
-                .collect();
+            let (sure, doubtful): (Vec<usize>, Vec<usize>) =
+                self.effects(&now, true).into_iter().partition(|i| now.sure.contains(i));
+            let left = FITTED.saturating_sub(doubtful.len());
             let log_odds = |(i, lacking): &(usize, Tried)| self.log_odds_of(*i, lacking.cost, now.cost);
-            let mut simpler = simpler;
-            // A look from nearby may end short of what the others can do: those that seem needed least are fitted.
-            simpler.sort_by(|a, b| log_odds(a).total_cmp(&log_odds(b)));
-            simpler.par_iter_mut().take(FITTED).for_each(|(_, lacking)| {
-                let better =
-                    self.fitted(lacking.chosen.clone(), lacking.place()).filter(|b| b.cost < lacking.cost);
-                if let Some(better) = better {
-                    *lacking = better;
-                }
-            });
-            let least = simpler.iter().min_by(|a, b| log_odds(a).total_cmp(&log_odds(b)));
-            match least.filter(|l| log_odds(l) < 0.0) {
-                Some(least) => now = least.1.clone(),
+            let without_unlikeliest = |simpler: &[(usize, Tried)]| {
+                let unlikely = simpler.iter().filter(|s| log_odds(s) < 0.0);
+                let least = unlikely.min_by(|a, b| log_odds(a).total_cmp(&log_odds(b)));
+                least.map(|(_, lacking)| lacking.clone())
+            };
+            let mut simpler = self.without_each(&now, doubtful, FITTED);
+            let mut next = without_unlikeliest(&simpler);
+            if next.is_none() {
+                // What is left in the end is asked for once, however sure.
+                simpler.extend(self.without_each(&now, sure, left));
+                next = without_unlikeliest(&simpler);
+            }
+            match next {
+                Some(lacking) => now = lacking,
                 None => return (now, simpler),
             }
         }
+    }
+
+    /// A model without each of some effects; without those that seem needed least, so many of them, it is fitted to the end: a look from nearby may stop
+    /// short of what the others can do.
+    fn without_each(&self, now: &Tried, effects: Vec<usize>, fitted: usize) -> Vec<(usize, Tried)> {
+        let lacking = |i: usize| Some((i, self.lacking(now, &[i])?));
+        let mut simpler: Vec<(usize, Tried)> = effects.into_par_iter().filter_map(lacking).collect();
+        let log_odds = |(i, lacking): &(usize, Tried)| self.log_odds_of(*i, lacking.cost, now.cost);
+        simpler.sort_by(|a, b| log_odds(a).total_cmp(&log_odds(b)));
+        simpler.par_iter_mut().take(fitted).for_each(|(_, lacking)| {
+            let better =
+                self.fitted(lacking.chosen.clone(), lacking.place()).filter(|b| b.cost < lacking.cost);
+            if let Some(better) = better {
+                *lacking = better;
+            }
+        });
+        simpler
     }
 
     /// Puts in each effect's place what does nearly the same, and keeps what predicts best; each effect's rivals with their odds over its.

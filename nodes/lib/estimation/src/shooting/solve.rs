@@ -33,7 +33,8 @@ pub struct Fit {
     pub stop: StopReason,
     /// Steps taken.
     pub iterations: usize,
-    free: Vec<usize>,
+    /// The free parameters of the model: rows of the linearization.
+    pub free: Vec<usize>,
 }
 
 impl Fit {
