@@ -517,3 +517,24 @@ impl<'m, 'a, T: Real> Mover<'m, 'a, T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use gripsight_vehicle::Dual;
+
+    use super::*;
+    use crate::terms::tests::assert_same;
+
+    #[test]
+    fn slips_and_accelerations_have_the_derivatives_of_their_formulas() {
+        let of = |lane: usize, value: f64| Dual::<5>::variable(value, lane);
+        let [steer_rad, v_x, v_y, r, lever_m] =
+            [(0, 0.1), (1, 6.0), (2, -0.3), (3, 1.2), (4, 0.16)].map(|(lane, value)| of(lane, value));
+        let [front, rear] =
+            [1.0, -1.0].map(|side| slip_angle_rad(&steer_rad, [&v_x, &v_y, &r], (side, &lever_m)));
+        assert_same(front, steer_rad - ((v_y + r * lever_m) / v_x).atan());
+        assert_same(rear, steer_rad - ((v_y - r * lever_m) / v_x).atan());
+        let rate = over([(1.0, &v_x), (-1.0, &v_y)], &lever_m, [&steer_rad, &r]);
+        assert_same(rate, (v_x - v_y) / lever_m + steer_rad + r);
+    }
+}

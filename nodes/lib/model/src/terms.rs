@@ -362,7 +362,9 @@ pub(crate) fn delayed<T: Real>(series: &[T], delay_s: T, dt_s: f64) -> Vec<T> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
+    use gripsight_vehicle::Dual;
+
     use super::*;
 
     #[test]
@@ -371,6 +373,40 @@ mod tests {
         approx::assert_relative_eq!(carried(1000.0), 1000.0);
         approx::assert_relative_eq!(carried(1100.0), 1100.0 * 0.99);
         approx::assert_relative_eq!(carried(800.0), 800.0 * 1.02);
+    }
+
+    /// Asserts that a number is another one with its derivatives.
+    pub(crate) fn assert_same<const N: usize>(a: Dual<N>, b: Dual<N>) {
+        approx::assert_relative_eq!(a.re(), b.re(), max_relative = 1e-12);
+        for (a, b) in a.derivatives().iter().zip(b.derivatives()) {
+            approx::assert_relative_eq!(a, b, max_relative = 1e-10, epsilon = 1e-13);
+        }
+    }
+
+    #[test]
+    fn steps_that_are_derived_at_once_are_what_their_formulas_give() {
+        const H_S: f64 = 0.01;
+        let of = |lane: usize, value: f64| Dual::<4>::variable(value, lane);
+        for tau_s in [1e-5, 2e-3, 0.02] {
+            let [y0, u0, u1, tau_s] =
+                [0.3, 1.0, 1.4, tau_s].into_iter().enumerate().map(|(i, v)| of(i, v)).collect::<Vec<_>>()[..]
+            else {
+                unreachable!()
+            };
+            let decay = (-(tau_s.recip() * H_S)).exp();
+            let step = |u1: Dual<4>| {
+                let ramp = (u1 - u0) / H_S * tau_s;
+                u1 - ramp + (y0 - u0 + ramp) * decay
+            };
+            let lag = Lag::new(H_S, tau_s);
+            assert_same(lag.step(y0, u0, u1), step(u1));
+            let end = step(u1 * 2.0 - u0);
+            assert_same(lag.mean(y0, u0, u1), u1 - (end - y0) / H_S * tau_s);
+        }
+        let [load_n, at_rest_n, one] = [of(0, 900.0), of(1, 1000.0), Dual::from(1.0)];
+        let axle = Axle { load_n, steer_rad: one, grip: one, usable: one };
+        let more = load_n / at_rest_n - 1.0;
+        assert_same(axle.carried_n(at_rest_n), load_n * (-(more * LOAD_SENSITIVITY) + 1.0));
     }
 
     #[test]

@@ -213,6 +213,20 @@ mod tests {
         }
 
         #[test]
+        fn grip_and_usable_share_are_chained_as_they_are_written(
+            tire in tires(), a in -0.5..0.5, grip in 0.3..1.5, usable in 0.1..1.0,
+        ) {
+            let lane = |lane: usize, v: f64| Dual::<7>::variable(v, lane);
+            let dual = MagicFormula { b: lane(0, tire.b), c: lane(1, tire.c), d: lane(2, tire.d), e: lane(3, tire.e) };
+            let (a, grip, usable) = (lane(4, a), lane(5, grip), lane(6, usable));
+            let (one, written) = (dual.gripping_force(a, grip, usable), dual.normalized_force(a / grip) * grip * usable);
+            approx::assert_relative_eq!(one.re(), written.re(), max_relative = 1e-12, epsilon = 1e-15);
+            for (by, written) in one.derivatives().iter().zip(written.derivatives()) {
+                approx::assert_relative_eq!(by, written, max_relative = 1e-10, epsilon = 1e-12);
+            }
+        }
+
+        #[test]
         fn the_peak_is_the_largest_force(tire in tires(), a in 0.0..1.5) {
             prop_assert!(tire.normalized_force(a) <= tire.max_force_within(1.5) + 1e-4 * tire.d);
         }
