@@ -107,8 +107,11 @@ fn a_v_y_that_was_made_of_the_poses_is_named_and_replaced() {
     let channels: Vec<_> = estimated.channels.iter().map(|c| c.channel).collect();
     // The recorded one scatters by 0.1 m/s.
     assert!(channels == ["v_y_mps"] && estimated.channels[0].sigma < 0.05, "{estimated:?}");
-    let said = "its change is 0.17 times what the accelerations leave for it";
-    assert!(outcome.reasons.iter().any(|r| r.contains(said)), "{:?}", outcome.reasons);
+    // A tenth of it, if that.
+    let said = |r: &String| {
+        r.contains("its change is 0.0") && r.contains("times what the accelerations leave for it")
+    };
+    assert!(outcome.reasons.iter().any(said), "{:?}", outcome.reasons);
     // No more than the car turned with.
     let held = sequence.v_x_mps.iter().zip(&sequence.yaw_rate_radps).map(|(v, r)| (v * r).abs());
     let most_g = f64::from(held.fold(0.0, f32::max)) / 9.81;

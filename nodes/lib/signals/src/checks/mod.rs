@@ -150,6 +150,8 @@ const NOT_THE_MOTION: f64 = 0.5;
 
 /// Spans in a row over which turns are compared.
 const TURN_SPANS: [usize; 3] = [1, 3, 8];
+/// Spans in a row over which the change of v_y is.
+const SLIP_SPANS: [usize; 2] = [1, 2];
 
 const DEG: f64 = 180.0 / std::f64::consts::PI;
 const G: f64 = 1.0 / 9.806_65;
@@ -226,10 +228,15 @@ pub fn cross_check(sequence: &StateSequence) -> Result<Checks, SignalError> {
     if let Some((first, second)) = spans.forward_forces() {
         add(Pair::ForwardAccelerationAndMotion, &first, &second, slope(&first, &second, 0.3));
     }
-    if let Some((change, left, [turned, turning, steering])) = spans.slipping() {
+    // Noise of v_y asks for long spans, and what jumps for short ones: the length that tells most counts here, too.
+    let slips = SLIP_SPANS.iter().filter_map(|&n| spans.slipping(n)).map(|(change, left, beside)| {
+        let [turned, turning, steering] = beside;
         // An accelerometer that does not show the turning shows no sideslip.
         let found =
             shows_turning.then(|| lateral_slope(&change, &left, &[&turned, &turning], &steering)).flatten();
+        (change, left, found)
+    });
+    if let Some((change, left, found)) = slips.min_by(|a, b| width(&a.2).total_cmp(&width(&b.2))) {
         add(Pair::LateralSpeedAndAcceleration, &change, &left, found);
     }
     if let Some((first, second)) = spans.steering() {
@@ -242,7 +249,7 @@ pub fn cross_check(sequence: &StateSequence) -> Result<Checks, SignalError> {
 /// The change of v_y over what a_y leaves for it. A road's bank and a body that shakes are in a_y and lower the slope of a v_y that is measured; the slope the other
 /// way round is free of them, and both enclose the truth (Frisch 1934). Where these leave it open the steering tells: what it moves, both show.
 fn lateral_slope(change: &[f64], left: &[f64], beside: &[&[f64]], steering: &[f64]) -> Option<Slope> {
-    const LEAST_MPS: f64 = 0.02;
+    const LEAST_MPS: f64 = 0.01;
     let pair = Pair::LateralSpeedAndAcceleration;
     let direct = slope_beside(change, left, beside, LEAST_MPS)?;
     let is_low = judged(pair, Some(direct)).disagrees() && (0.0..1.0).contains(&direct.value);

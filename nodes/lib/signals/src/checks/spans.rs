@@ -186,19 +186,61 @@ impl<'a> Spans<'a> {
     }
 
     /// The change of v_y and what a_y leaves for it; and the turning (an accelerometer's scale, a body's roll), its change (the unit's place), and that of the
-    /// steering.
-    pub(super) fn slipping(&self) -> Beside<3> {
+    /// steering; over so many spans in a row, beginning at each.
+    ///
+    /// v_y' = a_y - v_x r is weighed with a function w that rises from nothing and falls back to it (modulating functions: Shinbrot, NACA TN 3288 (1954)): the
+    /// integral of w v_y' is that of -w' v_y, the mean of the second half less that of the first, and no single sample's noise is in it.
+    pub(super) fn slipping(&self, in_a_row: usize) -> Beside<3> {
         let s = self.sequence;
-        let rows = self.rows(!s.a_y_mps2.is_empty() && s.has_v_y(), |span| {
-            let turning = |k: usize| f64::from(s.v_x_mps[k]) * f64::from(s.yaw_rate_radps[k]);
-            let change = |v: &[f32]| f64::from(v[span.1] - v[span.0]);
-            let turned = self.integral_of(turning, span);
-            let left = self.integral(&s.a_y_mps2, span) - turned;
-            let turning = change(&s.yaw_rate_radps);
-            Some([change(&s.v_y_mps), left, turned, turning, change(&s.steering_rad)])
-        })?;
+        if s.a_y_mps2.is_empty() || !s.has_v_y() {
+            return None;
+        }
+        let turning = |k: usize| f64::from(s.v_x_mps[k]) * f64::from(s.yaw_rate_radps[k]);
+        let rows: Vec<[f64; 5]> = self
+            .spans
+            .windows(in_a_row)
+            .filter(|spans| spans.windows(2).all(|two| two[0].1 == two[1].0))
+            .map(|spans| {
+                let span = (spans[0].0, spans[in_a_row - 1].1);
+                let turned = self.weighed(turning, span);
+                [
+                    self.change(&s.v_y_mps, span),
+                    self.weighed(|k| f64::from(s.a_y_mps2[k]), span) - turned,
+                    turned,
+                    self.change(&s.yaw_rate_radps, span),
+                    self.change(&s.steering_rad, span),
+                ]
+            })
+            .collect();
         let column = |j: usize| rows.iter().map(|r| r[j]).collect::<Vec<_>>();
-        Some((column(0), column(1), [column(2), column(3), column(4)]))
+        (rows.len() >= 20).then(|| (column(0), column(1), [column(2), column(3), column(4)]))
+    }
+
+    /// Steps of a span: the middle of each as a share of the half span from its middle, -1 to 1, and its length, s.
+    fn steps(&self, (from, to): (usize, usize)) -> impl Iterator<Item = (usize, f64, f64)> {
+        let t = &self.sequence.time_s;
+        let (middle_s, half_s) = (f64::from(t[from] + t[to]) / 2.0, f64::from(t[to] - t[from]) / 2.0);
+        (from..to).map(move |k| {
+            let at_s = f64::from(t[k] + t[k + 1]) / 2.0;
+            (k, (at_s - middle_s) / half_s, f64::from(t[k + 1] - t[k]))
+        })
+    }
+
+    /// The integral of a series over a span, weighed by a triangle.
+    fn weighed(&self, series: impl Fn(usize) -> f64, span: (usize, usize)) -> f64 {
+        self.steps(span)
+            .map(|(k, share, dt_s)| (1.0 - share.abs()) * 0.5 * (series(k) + series(k + 1)) * dt_s)
+            .sum()
+    }
+
+    /// The same of a series' derivative: its mean over the second half less that over the first.
+    fn change(&self, series: &[f32], span: (usize, usize)) -> f64 {
+        let half_s = 0.5 * self.duration_s(span);
+        self.steps(span)
+            .map(|(k, share, dt_s)| {
+                share.signum() * 0.5 * f64::from(series[k] + series[k + 1]) * dt_s / half_s
+            })
+            .sum()
     }
 
     pub(super) fn steering(&self) -> Pairs {

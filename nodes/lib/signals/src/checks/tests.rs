@@ -106,6 +106,24 @@ fn a_v_y_that_another_model_made_is_found_out() {
 }
 
 #[test]
+fn noise_of_single_samples_hides_no_v_y_that_another_model_made() {
+    // A tenth of a metre a second, of a sideslip of 0.2: white, as an optical sensor's.
+    let noisy = |share: f64| {
+        let checks = with(|s| {
+            for (k, v_y) in s.v_y_mps.iter_mut().enumerate() {
+                let noise = 0.35 * ((k as f64 * 78.233).sin() * 43_758.547).fract();
+                *v_y = (share * f64::from(*v_y) + noise) as f32;
+            }
+        });
+        *checks.of(Pair::LateralSpeedAndAcceleration).unwrap()
+    };
+    let (honest, made) = (noisy(1.0), noisy(0.7));
+    assert_eq!(honest.finding, Finding::Agrees, "{honest:?}");
+    assert!(matches!(made.finding, Finding::NotMeasured { .. }), "{made:?}");
+    assert!(honest.high - honest.low < 0.3, "{honest:?}");
+}
+
+#[test]
 fn jumps_of_the_localisation_and_outliers_do_not_bend_the_slope() {
     let jumping = with(|s| {
         for (n, k) in [500, 1100, 1700, 2300, 2900].into_iter().enumerate() {
