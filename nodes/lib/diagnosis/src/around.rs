@@ -96,43 +96,15 @@ impl Around<'_, '_> {
         self.refined(ITERATIONS, chosen, &linear.step, self.places(&linear.step)).map(|ended| ended.fitted)
     }
 
-    /// The same, as far as it goes. `near`: another one that is fitted, and which one; what tells them apart is added by the linearisation.
-    pub(crate) fn by_rollouts_to_the_end(
-        &self,
-        problem: &Quadratic,
-        chosen: &[usize],
-        near: Option<(&[usize], &Refined)>,
-    ) -> Option<Ended> {
+    /// The same, as far as it goes; an effect that would stay as it is begins at its starts.
+    pub(crate) fn by_rollouts_to_the_end(&self, problem: &Quadratic, chosen: &[usize]) -> Option<Ended> {
         let step = configuration(problem, self.dispersion, self.terms, chosen)?.step;
-        let near = near.and_then(|near| self.beginnings(near, problem, chosen, &step)).unwrap_or_default();
-        let begins = self.places(&step).into_iter().chain(near).collect();
+        let begins = self.places(&step).into_iter().chain(self.started(chosen)).collect();
         let ended = self.refined(ITERATIONS_TO_THE_END, chosen, &step, begins)?;
         let alone = self.without_alike(chosen, &ended.fitted);
         let alone = alone.and_then(|begin| self.refined(ITERATIONS_TO_THE_END, chosen, &step, vec![begin]));
         let cost = |of: &Ended| of.fit.linearization.cost;
         Some(alone.filter(|alone| cost(alone) < cost(&ended)).unwrap_or(ended))
-    }
-
-    /// A configuration as a look left it.
-    pub(crate) fn there(&self, chosen: &[usize], look: Refined) -> Option<Ended> {
-        self.refined(0, chosen, &DVector::zeros(self.values.len()), vec![look])
-    }
-
-    /// By how much the log evidence would fall without each effect of a fitted configuration, by term, were the problem as linear as it is at the fit (Wald).
-    pub(crate) fn linear_losses(&self, chosen: &[usize], ended: &Ended) -> Option<Vec<(usize, f64)>> {
-        let (_, _, map) = self.model(self.engine, chosen, &ended.fitted.values);
-        let loss = |i: usize| {
-            let effect = self.columns.effects[i];
-            let from = self.columns.of_effect(effect)?.start;
-            let own: Vec<usize> =
-                (from..from + effect.sizing()).filter_map(|c| map.iter().position(|m| *m == c)).collect();
-            let sizes =
-                own.iter().zip(effect.spec().parameters).map(|(&j, p)| ended.fit.parameters[j] - p.null);
-            let sizes = DVector::from_iterator(own.len(), sizes);
-            let known = ended.fit.posterior_of(&own)?.cholesky()?;
-            Some((FIRST + i, 0.5 * sizes.dot(&known.solve(&sizes)) / self.dispersion))
-        };
-        Some((0..self.columns.effects.len()).filter(|&i| chosen[FIRST + i] > 0).filter_map(loss).collect())
     }
 
     /// Where a linearisation leads, and where it was made.
@@ -165,48 +137,19 @@ impl Around<'_, '_> {
         effects.find(|(e, c)| **c > 0 && e.spec().flat_at_null && absent(**e)).map(|(e, _)| *e)
     }
 
-    /// Where the fit of a configuration begins that has `near`'s fit beside it: there, and with what tells the two apart by the linearisation; where an effect
-    /// would stay as it is, at its starts.
-    fn beginnings(
-        &self,
-        near: (&[usize], &Refined),
-        problem: &Quadratic,
-        chosen: &[usize],
-        step: &DVector<f64>,
-    ) -> Option<Vec<Refined>> {
-        let apart = self.apart_from(near, problem, step)?;
-        let fitted = near.1.clone();
-        let Some(effect) = self.stuck(chosen, &fitted.values) else { return Some(vec![apart, fitted]) };
-        let range = self.columns.of_effect(effect)?;
+    /// Where the linearisation is, with the effect that would stay as it is at its starts.
+    fn started(&self, chosen: &[usize]) -> Vec<Refined> {
+        let stuck = self.stuck(chosen, self.values);
+        let Some((effect, range)) = stuck.and_then(|e| Some((e, self.columns.of_effect(e)?))) else {
+            return Vec::new();
+        };
         let size = &effect.spec().parameters[0];
         let started = |multiple: &f64| {
-            let mut begin = fitted.clone();
-            begin.values[range.clone()].copy_from_slice(&self.values[range.clone()]);
-            begin.values[range.start] = size.null + multiple * self.engine.size(size);
-            begin
+            let mut values = self.values.to_vec();
+            values[range.start] = size.null + multiple * self.engine.size(size);
+            Refined { values, starts: self.starts.to_vec() }
         };
-        Some(effect.spec().starts.iter().map(started).chain([apart]).collect())
-    }
-
-    /// Where another configuration's fit leads, with what tells the two apart by the linearisation; `step`: the linear answer of this one.
-    fn apart_from(
-        &self,
-        (other, fitted): (&[usize], &Refined),
-        problem: &Quadratic,
-        step: &DVector<f64>,
-    ) -> Option<Refined> {
-        let its = configuration(problem, self.dispersion, self.terms, other)?.step;
-        let (apart, has) = (step - its, self.in_use(other));
-        // Of an effect that is absent there the linearisation tells the size alone: what shapes it stays.
-        let shapes = |e: &EffectId| self.columns.of_effect(*e).map(|r| r.start + e.sizing()..r.end);
-        let shaping: Vec<usize> = self.columns.effects.iter().filter_map(shapes).flatten().collect();
-        let at = |c: usize| match (has[c], shaping.contains(&c)) {
-            (true, _) => fitted.values[c] + apart[c],
-            (false, true) => self.values[c],
-            (false, false) => self.values[c] + step[c],
-        };
-        let values = (0..self.values.len()).map(at).collect();
-        Some(Refined { values, starts: fitted.starts.clone() })
+        effect.spec().starts.iter().map(started).collect()
     }
 
     /// The model of a configuration fitted by rollouts, from where the linear step leads, where the linearisation is, or one of `near`, whichever is best. Terms
@@ -279,17 +222,6 @@ impl Around<'_, '_> {
         let here = |values| Refined { values, starts: self.starts.to_vec() };
         // Where the linear answer leads nowhere: from where it began.
         self.by_chord_steps(problem, chosen, &[here(answer), here(self.values.to_vec())])
-    }
-
-    /// The same from another configuration's fit.
-    pub(crate) fn beside(
-        &self,
-        problem: &Quadratic,
-        chosen: &[usize],
-        near: (&[usize], &Refined),
-    ) -> Option<(f64, Refined)> {
-        let step = configuration(problem, self.dispersion, self.terms, chosen)?.step;
-        self.by_chord_steps(problem, chosen, &self.beginnings(near, problem, chosen, &step)?)
     }
 
     /// A configuration fitted roughly from the best of some places, by steps whose derivatives stay those of the linearisation (chord steps), so that each
@@ -380,110 +312,24 @@ impl Around<'_, '_> {
 
 #[cfg(test)]
 mod tests {
-    use gripsight_estimation::split;
-    use gripsight_model::Flexible;
-    use gripsight_vehicle::VehicleParameters;
-
     use super::*;
-    use crate::hypotheses::terms;
-    use crate::pruned::{CLEAR, DOUBTFUL};
-    use crate::testing::{drive, tires};
-    use crate::trust::TireTrust;
-
-    fn with_around<T>(lag_s: f64, far: f64, then: impl FnOnce(&Around<'_, '_>, &Quadratic) -> T) -> T {
-        let vehicle = VehicleParameters::f1tenth();
-        let recording = drive(&vehicle, lag_s);
-        let engine = Engine::new(&recording, &vehicle, tires(), TireTrust::file());
-        let windows = split(&recording, true).training;
-        let null = engine.fit(&[], &engine.blank(), None, &windows, 15);
-        let mut library: Vec<EffectId> = EffectId::background().collect();
-        library.extend([EffectId::SteeringLag, EffectId::SteeringRateLimit, EffectId::VyBias]);
-        let flexible = Flexible::new(&recording, 0.1, vehicle.wheelbase_m(), &Site::ALL);
-        let columns = Columns::new(library.clone(), flexible);
-        let mut values = columns.blank(&engine);
-        values[..BASE].copy_from_slice(&null.parameters[..BASE]);
-        values[0] *= far;
-        let joint = Joint::around(&engine, &columns, &values, &null.starts, &windows).unwrap();
-        let scale = vec![1.0; recording.channels.len()];
-        let problem = joint.weighed(&scale).total;
-        let terms = terms(&engine, &columns, &values, &library);
-        let around = Around {
-            engine: &engine,
-            columns: &columns,
-            terms: &terms,
-            values: &values,
-            starts: &null.starts,
-            windows: &windows,
-            dispersion: 1.0,
-            joint: &joint,
-            scale: &scale,
-        };
-        then(&around, &problem)
-    }
-
-    fn configured(around: &Around<'_, '_>, effects: &[EffectId]) -> Vec<usize> {
-        let mut chosen = vec![0; around.terms.len()];
-        for effect in effects {
-            chosen[FIRST + around.columns.effects.iter().position(|e| e == effect).unwrap()] = 1;
-        }
-        chosen
-    }
-
-    #[test]
-    fn a_look_beside_a_fit_is_as_good_as_the_fit_wherever_the_linearisation_is() {
-        const LAG_S: f64 = 0.06;
-        const FAR: f64 = 0.3;
-        with_around(LAG_S, FAR, |around, problem| {
-            let with_lag = configured(around, &[EffectId::SteeringLag]);
-            let fit = around.by_rollouts_to_the_end(problem, &with_lag, None).unwrap().fitted;
-            let lag = around.columns.of_effect(EffectId::SteeringLag).unwrap().start;
-            assert!((fit.values[lag] - LAG_S).abs() < 0.005, "{}", fit.values[lag]);
-            let fuller = configured(around, &[EffectId::SteeringLag, EffectId::VyBias]);
-            let (from_afar, _) = around.nearby(problem, &fuller).unwrap();
-            let (beside, look) = around.beside(problem, &fuller, (&with_lag, &fit)).unwrap();
-            let (itself, _) = around.beside(problem, &with_lag, (&with_lag, &fit)).unwrap();
-            assert!(beside > from_afar + CLEAR, "{beside} {from_afar}");
-            // One parameter more costs its prior weight, and the rest is as good as the fit.
-            assert!((beside - itself).abs() < DOUBTFUL, "{beside} {itself}");
-            assert!((look.values[lag] - LAG_S).abs() < 0.005, "{}", look.values[lag]);
-        });
-    }
-
-    #[test]
-    fn a_fit_tells_by_its_own_derivatives_what_it_surely_needs() {
-        with_around(0.06, 1.0, |around, problem| {
-            let chosen = configured(around, &[EffectId::SteeringLag, EffectId::VyBias]);
-            let ended = around.by_rollouts_to_the_end(problem, &chosen, None).unwrap();
-            let losses = around.linear_losses(&chosen, &ended).unwrap();
-            let of = |effect| {
-                let place = around.columns.effects.iter().position(|e| *e == effect).unwrap();
-                losses.iter().find(|(term, _)| *term == FIRST + place).unwrap().1
-            };
-            assert_eq!(losses.len(), 2);
-            let [lag, bias] = [EffectId::SteeringLag, EffectId::VyBias].map(of);
-            assert!(lag > CLEAR && bias < DOUBTFUL, "{lag} {bias}");
-        });
-    }
+    use crate::testing::{configured, with_around};
 
     #[test]
     fn a_fit_leads_away_from_where_an_effect_is_absent_and_its_derivative_vanishes() {
-        const LAG_S: f64 = 0.06;
-        with_around(LAG_S, 1.0, |around, problem| {
-            let [nothing, with_limit] =
-                [&[][..], &[EffectId::SteeringRateLimit]].map(|e| configured(around, e));
-            let fit = around.by_rollouts_to_the_end(problem, &nothing, None).unwrap().fitted;
-            assert_eq!(around.stuck(&with_limit, &fit.values), Some(EffectId::SteeringRateLimit));
-            let limited =
-                around.by_rollouts_to_the_end(problem, &with_limit, Some((&nothing, &fit))).unwrap().fitted;
+        with_around(0.06, |around, weighed| {
+            let with_limit = configured(around, &[EffectId::SteeringRateLimit]);
+            assert_eq!(around.stuck(&with_limit, around.values), Some(EffectId::SteeringRateLimit));
+            let limited = around.by_rollouts_to_the_end(&weighed.total, &with_limit).unwrap().fitted;
             assert_eq!(around.stuck(&with_limit, &limited.values), None);
         });
     }
 
     #[test]
     fn a_fit_begins_anew_without_the_little_of_what_does_nearly_the_same() {
-        with_around(0.06, 1.0, |around, problem| {
+        with_around(0.06, |around, weighed| {
             let [nothing, with_lag] = [&[][..], &[EffectId::SteeringLag]].map(|e| configured(around, e));
-            let mut fit = around.by_rollouts_to_the_end(problem, &with_lag, None).unwrap().fitted;
+            let mut fit = around.by_rollouts_to_the_end(&weighed.total, &with_lag).unwrap().fitted;
             let relaxation = around.columns.of_effect(EffectId::TireRelaxation).unwrap();
             fit.values[relaxation.start] = 0.02;
             let begin = around.without_alike(&with_lag, &fit).unwrap();

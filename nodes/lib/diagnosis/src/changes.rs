@@ -38,7 +38,7 @@ const OTHER_TIRES: f64 = 10.0;
 /// Of the draws of configurations.
 pub(crate) const SEED: u64 = 23;
 /// Share of a dispersion above which it is the same.
-const SETTLED: f64 = 0.95;
+pub(crate) const SETTLED: f64 = 0.95;
 
 /// The differences of two drives.
 #[derive(Debug, Clone)]

@@ -2,13 +2,13 @@
 
 use gripsight_estimation::Split;
 use gripsight_estimation::selection::Term;
-use gripsight_model::{Channel, EffectId, Recording};
+use gripsight_model::{Channel, EffectId, Recording, TIRES};
 use gripsight_signals::DataHealth;
 use gripsight_vehicle::VehicleParameters;
 
 use crate::answer::Change;
 use crate::budget::Budget;
-use crate::changes::{Compared, compare};
+use crate::changes::{Compared, SETTLED, compare};
 use crate::decisions;
 use crate::diagnose::{SEARCH_WINDOWS, explain};
 use crate::engine::Engine;
@@ -169,17 +169,27 @@ impl Pair {
             let columns = of.from..of.from + of.priors.len();
             values[columns.clone()].copy_from_slice(&after[columns]);
         }
+        // And have stood in for what has changed.
+        values[..TIRES].copy_from_slice(&after[..TIRES]);
         (chosen != self.around).then_some((values, chosen))
     }
 
-    /// Whether the later drive is likelier to be of this model than of one with fewer terms, by what either leaves of it; and the drives contradict each other by
-    /// no more.
+    /// Whether the later drive is likelier to be of this model than of one with fewer terms, by what either leaves of it and how far it takes what is known
+    /// beforehand (tires that stand in for another grip); and the drives contradict each other by no more.
     fn is_likelier(&self, simpler: &Self) -> bool {
         let contradiction = |of: &Self| of.compared.dispersion;
-        let gained = (simpler.later.weighed.cost - self.later.weighed.cost) / self.later.dispersion;
-        contradiction(self) <= contradiction(simpler)
-            && gained > contradiction(simpler) * price(&self.later.terms, &simpler.around, &self.around)
+        let left = (simpler.later.weighed.cost - self.later.weighed.cost) / self.later.dispersion;
+        let pulled = pull(&simpler.later.terms, &simpler.around) - pull(&self.later.terms, &self.around);
+        SETTLED * contradiction(self) <= contradiction(simpler)
+            && left + pulled
+                > contradiction(simpler) * price(&self.later.terms, &simpler.around, &self.around)
     }
+}
+
+/// How far the present values of a model are from where they are expected: the sum of squares over their variances.
+fn pull(terms: &[Term], chosen: &[usize]) -> f64 {
+    let of = |(t, &c): (&Term, &usize)| t.priors.iter().map(|p| (p.offset / p.sigma[c]).powi(2)).sum::<f64>();
+    terms.iter().zip(chosen).map(of).sum()
 }
 
 /// The drop of a cost by which terms that only one of two models has are worth it (twice the log odds against them).

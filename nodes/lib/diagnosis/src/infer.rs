@@ -23,7 +23,7 @@ use crate::joint::{Joint, Weighed};
 use crate::pruned::Pruned;
 use crate::sizes::{Sizes, told};
 use crate::state::State;
-use crate::stated::{Fits, Stated};
+use crate::stated::Stated;
 use gripsight_estimation::Windows;
 use gripsight_estimation::selection::{Quadratic, Term, configuration, select};
 use gripsight_model::BASE;
@@ -36,8 +36,6 @@ pub(crate) const FIRST: usize = 2;
 const ROUNDS: usize = 7;
 /// Rounds at most in which effects alone are compared: beside free terms a linearisation far from the cause would blame them.
 const CLOSED_ROUNDS: usize = 4;
-/// Linearisations at most around what data that nothing was fitted to leave.
-const AGAIN: usize = 3;
 /// Rounds after which the noise stays.
 const NOISE_ROUNDS: usize = 2;
 
@@ -128,19 +126,8 @@ pub(crate) fn infer(
         if (same && open_flexible && rounds > NOISE_ROUNDS) || last {
             let confirmed = around.confirmed(&weighed.total, &selection, &losses)?;
             progress("asking data that nothing was fitted to");
-            let fits = Fits::default();
-            let mut found = around.stated(&weighed, (best, fitted), (closed, &[]), scorer, &fits)?;
-            let mut sizes = Sizes::of(&around, library, &found.chosen, &found.fitted, windows)?;
-            // What is left is another model than the one that everything was linearised around.
-            let mut linearised = chosen;
-            for _ in 0..AGAIN {
-                if linearised.as_ref() == Some(&found.chosen) {
-                    break;
-                }
-                linearised = Some(found.chosen.clone());
-                (found, sizes) =
-                    again(engine, &columns, library, windows, dispersion, (scorer, &fits), found)?;
-            }
+            let found = around.stated(library, &weighed, (best, fitted), closed, scorer)?;
+            let sizes = Sizes::of(&around, library, &found.chosen, &found.fitted, windows)?;
             let Stated { chosen: best, beside, statements: mut stated, .. } = found;
             for statement in &mut stated {
                 let effect = columns.effects[statement.term - FIRST];
@@ -172,39 +159,6 @@ pub(crate) fn infer(
         (values, starts) = (fitted.values, fitted.starts);
         chosen = Some(best);
     }
-}
-
-/// Linearises everything around a model that was found, and asks data that nothing was fitted to once more.
-fn again(
-    engine: &Engine<'_>,
-    columns: &Columns,
-    library: &[EffectId],
-    windows: &Windows,
-    dispersion: f64,
-    (scorer, fits): (&Scorer<'_>, &Fits),
-    Stated { chosen, fitted, beside, .. }: Stated,
-) -> Option<(Stated, Sizes)> {
-    let (mut values, starts) = (fitted.values.clone(), &fitted.starts);
-    let mut joint = Joint::around(engine, columns, &values, starts, windows)?;
-    differences(engine, columns, &mut values, starts, windows, &mut joint);
-    let terms = terms(engine, columns, &values, library);
-    let scale = vec![1.0; engine.sigma.len()];
-    let weighed = joint.weighed(&scale);
-    let around = Around {
-        engine,
-        columns,
-        terms: &terms,
-        values: &values,
-        starts,
-        windows,
-        dispersion,
-        joint: &joint,
-        scale: &scale,
-    };
-    fits.forget_places_apart_from(&chosen, columns);
-    let found = around.stated(&weighed, (chosen, fitted.clone()), (None, &beside), scorer, fits)?;
-    let sizes = Sizes::of(&around, library, &found.chosen, &found.fitted, windows)?;
-    Some((found, sizes))
 }
 
 /// Linearises another drive in the same columns: at given values, or around the best fit to it of a configuration from there on. The engine's channel
@@ -269,7 +223,7 @@ pub(crate) fn linearised(
             joint: &joint,
             scale: &scale,
         };
-        let fitted = around.by_rollouts(&weighed.total, chosen)?;
+        let fitted = around.by_rollouts_to_the_end(&weighed.total, chosen)?.fitted;
         (values, starts) = (fitted.values, fitted.starts);
     }
     None
@@ -377,7 +331,6 @@ mod tests {
     use gripsight_vehicle::VehicleParameters;
 
     use super::*;
-    use crate::around::Refined;
     use crate::statement::Statement;
     use crate::testing::{drive, tires};
     use crate::trust::TireTrust;
@@ -417,34 +370,6 @@ mod tests {
         let steering = without.other(Site::Steering);
         assert!(steering > 0.9, "{:?}", without.confirmed);
         assert!([EffectId::VyBias, EffectId::GyroScale].iter().all(|e| without.probability(*e) < 0.5));
-    }
-
-    #[test]
-    fn linearised_again_around_another_model_the_cause_is_found_there() {
-        let vehicle = VehicleParameters::f1tenth();
-        let recording = drive(&vehicle, 0.06);
-        let engine = Engine::new(&recording, &vehicle, tires(), TireTrust::file());
-        let both = split(&recording, true);
-        let null = engine.fit(&[], &engine.blank(), None, &both.training, 15);
-        let effects: Vec<EffectId> = EffectId::background().chain(LIBRARY).collect();
-        let flexible = Flexible::new(&recording, LARGE_SLIP_RAD, vehicle.wheelbase_m(), &Site::ALL);
-        let columns = Columns::new(effects, flexible);
-        let mut values = columns.blank(&engine);
-        values[..BASE].copy_from_slice(&null.parameters[..BASE]);
-        let scorer = Scorer::new(&engine, None, &both);
-        let nothing = Stated {
-            chosen: vec![0; FIRST + columns.effects.len() + columns.len() - columns.first_flexible()],
-            fitted: Refined { values, starts: null.starts },
-            beside: Vec::new(),
-            statements: Vec::new(),
-        };
-        let (found, sizes) =
-            again(&engine, &columns, &LIBRARY, &both.training, 1.0, (&scorer, &Fits::default()), nothing)
-                .unwrap();
-        let named: Vec<EffectId> = found.statements.iter().map(|s| columns.effects[s.term - FIRST]).collect();
-        assert_eq!(named, [EffectId::SteeringLag]);
-        let (size, _) = sizes.effect(&columns, EffectId::SteeringLag).unwrap();
-        assert!((size[0] - 0.06).abs() < 0.01, "{size:?}");
     }
 
     #[test]

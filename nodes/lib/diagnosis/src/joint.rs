@@ -34,6 +34,8 @@ pub(crate) struct Joint {
     block: Vec<usize>,
     channels: usize,
     columns: usize,
+    /// Columns that were linearised; the others have no derivatives.
+    linearised: Vec<usize>,
 }
 
 /// The joint problem with its noise, block by block.
@@ -58,13 +60,32 @@ impl Joint {
         starts: &[[f64; 2]],
         windows: &Windows,
     ) -> Option<Self> {
+        Self::of_sites(engine, columns, values, starts, windows, &Site::ALL)
+    }
+
+    /// The same, of flexible terms only those of some sites, and those that are there.
+    pub(crate) fn of_sites(
+        engine: &Engine<'_>,
+        columns: &Columns,
+        values: &[f64],
+        starts: &[[f64; 2]],
+        windows: &Windows,
+        asked: &[Site],
+    ) -> Option<Self> {
         let present = |e: EffectId| {
             let range = columns.of_effect(e).unwrap_or(0..0);
             range.zip(e.spec().parameters).any(|(c, p)| (values[c] - p.null).abs() > 1e-12)
         };
         let open: Vec<Site> =
             Site::ALL.into_iter().filter(|r| columns.of_site(*r).any(|c| values[c] != 0.0)).collect();
-        let seeds = columns.chunks(LANES);
+        let is_asked = |r: &Site| asked.contains(r) || open.contains(r);
+        let elsewhere: Vec<Range<usize>> =
+            Site::ALL.into_iter().filter(|r| !is_asked(r)).map(|r| columns.of_site(r)).collect();
+        let seeds: Vec<Range<usize>> = columns
+            .chunks(LANES)
+            .into_iter()
+            .filter(|seeds| !elsewhere.iter().any(|range| overlap(range, seeds)))
+            .collect();
         let models: Vec<_> = seeds
             .iter()
             .map(|seeds| {
@@ -119,7 +140,14 @@ impl Joint {
         // A window in which the model runs away tells nothing, and would drown all others.
         let lost = parts.iter_mut().filter(|p| !p.is_calm()).map(Part::blank).count();
         let finite = 2 * lost < parts.len();
-        finite.then(|| Self { parts, block: windows.block.clone(), channels, columns: columns.len() })
+        let (block, columns) = (windows.block.clone(), columns.len());
+        finite.then(|| Self {
+            parts,
+            block,
+            channels,
+            columns,
+            linearised: seeds.into_iter().flatten().collect(),
+        })
     }
 
     /// What is left of each sample beyond what another recording of the same windows leaves of it; samples that one of them lacks are left out.
@@ -168,13 +196,16 @@ impl Joint {
 
     /// The problem where channel `c` has `scale[c]` times the noise that it was linearised with.
     pub(crate) fn weighed(&self, scale: &[f64]) -> Weighed {
+        let n = self.columns;
+        let zero = || Quadratic { information: DMatrix::zeros(n, n), gradient: DVector::zeros(n) };
         let parts: Vec<(Quadratic, f64, f64)> = self
             .blocks()
             .par_iter()
             .map(|members| {
-                let reduced: Vec<_> = members.iter().map(|&k| self.parts[k].reduced(scale)).collect();
+                let reduced: Vec<_> =
+                    members.iter().map(|&k| self.parts[k].reduced(scale, &self.linearised)).collect();
                 let rows: usize = reduced.iter().map(|r| r.0.len()).sum();
-                let mut tall = DMatrix::zeros(rows, self.columns);
+                let mut tall = DMatrix::zeros(rows, self.linearised.len());
                 let mut side = DVector::zeros(rows);
                 let (mut at, mut cost) = (0, 0.0);
                 for (residual, jacobian, loss) in &reduced {
@@ -185,13 +216,18 @@ impl Joint {
                 }
                 // A product of matrices is blocked, one with a transpose is not.
                 let across = tall.transpose();
-                let gradient = -(&across * &side);
-                (Quadratic { information: across * tall, gradient }, cost, rows as f64)
+                let (product, square) = (&across * &side, across * tall);
+                let mut block = zero();
+                for (i, &a) in self.linearised.iter().enumerate() {
+                    block.gradient[a] = -product[i];
+                    for (j, &b) in self.linearised.iter().enumerate() {
+                        block.information[(a, b)] = square[(i, j)];
+                    }
+                }
+                (block, cost, rows as f64)
             })
             .collect();
-        let n = self.columns;
-        let zero = Quadratic { information: DMatrix::zeros(n, n), gradient: DVector::zeros(n) };
-        let mut out = Weighed { total: zero, blocks: Vec::new(), cost: 0.0, residuals: 0.0 };
+        let mut out = Weighed { total: zero(), blocks: Vec::new(), cost: 0.0, residuals: 0.0 };
         for (block, cost, rows) in parts {
             out.total.information += &block.information;
             out.total.gradient += &block.gradient;
@@ -355,9 +391,10 @@ impl Part {
         (residual_less, jacobian_less, start)
     }
 
-    /// The same with the window's robust weight, and its cost.
-    fn reduced(&self, scale: &[f64]) -> (DVector<f64>, DMatrix<f64>, f64) {
-        let (residual, jacobian, _) = self.projected(scale);
+    /// The same of some columns with the window's robust weight, and its cost.
+    fn reduced(&self, scale: &[f64], columns: &[usize]) -> (DVector<f64>, DMatrix<f64>, f64) {
+        let part = Self { jacobian: self.jacobian.select_columns(columns), ..self.without_columns() };
+        let (residual, jacobian, _) = part.projected(scale);
         let (weight, cost) = robust(residual.norm_squared(), residual.len() as f64);
         (residual * weight.sqrt(), jacobian * weight.sqrt(), cost)
     }

@@ -46,6 +46,8 @@ mod hypotheses;
 mod infer;
 mod inferred;
 mod joint;
+mod moves;
+mod near;
 mod noise;
 mod outcome;
 mod paired;

@@ -41,7 +41,6 @@ impl Around<'_, '_> {
     /// others, each left out once. Not a number where it cannot be told.
     pub(crate) fn predictive_cost(
         &self,
-        terms: &[Term],
         scorer: &Scorer<'_>,
         chosen: &[usize],
         ended: &Ended,
@@ -52,7 +51,7 @@ impl Around<'_, '_> {
         } else {
             0.0
         };
-        apart + self.cost_left_out(terms, chosen, ended).unwrap_or(f64::NAN)
+        apart + self.cost_left_out(chosen, ended).unwrap_or(f64::NAN)
     }
 
     /// The same on the data held out alone. `starts`: where the first model that was looked at starts there.
@@ -74,11 +73,11 @@ impl Around<'_, '_> {
     }
 
     /// The columns of a configuration's model, in the model's order. What has come to its bound stays there.
-    fn own(&self, terms: &[Term], chosen: &[usize], map: &[usize], values: &[f64]) -> Vec<Own> {
+    fn own(&self, chosen: &[usize], map: &[usize], values: &[f64]) -> Vec<Own> {
         let in_use = self.in_use(chosen);
         let prior = |column: usize| -> Option<(&ColumnPrior, usize)> {
             let place = |t: &Term| (t.from..t.from + t.priors.len()).contains(&column);
-            let found = terms.iter().zip(chosen).find(|(t, _)| place(t));
+            let found = self.terms.iter().zip(chosen).find(|(t, _)| place(t));
             found.map(|(t, &alternative)| (&t.priors[column - t.from], alternative))
         };
         map.iter()
@@ -95,9 +94,9 @@ impl Around<'_, '_> {
     }
 
     /// The same of the blocks fitted, each left out once.
-    fn cost_left_out(&self, terms: &[Term], chosen: &[usize], Ended { fitted, fit }: &Ended) -> Option<f64> {
+    fn cost_left_out(&self, chosen: &[usize], Ended { fitted, fit }: &Ended) -> Option<f64> {
         let (model, values, map) = self.model(self.engine, chosen, &fitted.values);
-        let own = self.own(terms, chosen, &map, &values);
+        let own = self.own(chosen, &map, &values);
         let parameters: Vec<Parameter> = own.iter().map(|o| Own::fixed(o.value)).collect();
         let at = &fit.linearization;
         // What moves: its place in the fit, and its precision.

@@ -2,13 +2,22 @@
 
 #![allow(clippy::unwrap_used)]
 
-use gripsight_model::Recording;
+use gripsight_estimation::split;
+use gripsight_model::{BASE, EffectId, Flexible, Recording, Site};
 use gripsight_signals::StateSequence;
 use gripsight_vehicle::{
     Input, OwnTires, PacejkaParameters, SingleTrack, State as Motion, VehicleParameters,
 };
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
+
+use crate::around::Around;
+use crate::columns::Columns;
+use crate::engine::Engine;
+use crate::hypotheses::terms;
+use crate::infer::FIRST;
+use crate::joint::{Joint, Weighed};
+use crate::trust::TireTrust;
 
 const DT_S: f64 = 0.01;
 
@@ -48,4 +57,44 @@ pub(crate) fn drive(vehicle: &VehicleParameters, lag_s: f64) -> Recording {
         x = car.step(x, &input(k), &input((k + 1).min(SAMPLES - 1)), DT_S, 0.0025);
     }
     Recording::new(&sequence).unwrap()
+}
+
+/// A drive with a lag, everything linearised around its best tires.
+pub(crate) fn with_around<T>(lag_s: f64, then: impl FnOnce(&Around<'_, '_>, &Weighed) -> T) -> T {
+    let vehicle = VehicleParameters::f1tenth();
+    let recording = drive(&vehicle, lag_s);
+    let engine = Engine::new(&recording, &vehicle, tires(), TireTrust::file());
+    let windows = split(&recording, true).training;
+    let null = engine.fit(&[], &engine.blank(), None, &windows, 15);
+    let mut library: Vec<EffectId> = EffectId::background().collect();
+    library.extend([EffectId::SteeringLag, EffectId::SteeringRateLimit, EffectId::VyBias]);
+    let flexible = Flexible::new(&recording, 0.1, vehicle.wheelbase_m(), &Site::ALL);
+    let columns = Columns::new(library.clone(), flexible);
+    let mut values = columns.blank(&engine);
+    values[..BASE].copy_from_slice(&null.parameters[..BASE]);
+    let joint = Joint::around(&engine, &columns, &values, &null.starts, &windows).unwrap();
+    let scale = vec![1.0; recording.channels.len()];
+    let weighed = joint.weighed(&scale);
+    let terms = terms(&engine, &columns, &values, &library);
+    let around = Around {
+        engine: &engine,
+        columns: &columns,
+        terms: &terms,
+        values: &values,
+        starts: &null.starts,
+        windows: &windows,
+        dispersion: 1.0,
+        joint: &joint,
+        scale: &scale,
+    };
+    then(&around, &weighed)
+}
+
+/// The configuration with some effects.
+pub(crate) fn configured(around: &Around<'_, '_>, effects: &[EffectId]) -> Vec<usize> {
+    let mut chosen = vec![0; around.terms.len()];
+    for effect in effects {
+        chosen[FIRST + around.columns.effects.iter().position(|e| e == effect).unwrap()] = 1;
+    }
+    chosen
 }

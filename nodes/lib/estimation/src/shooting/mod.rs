@@ -21,7 +21,7 @@ mod solve;
 use gripsight_model::Window;
 
 pub use linearize::{Linearization, cost, linearize};
-pub use solve::{Fit, StopReason, fit};
+pub use solve::{Fit, StopReason, fit, within};
 
 /// What is known of a parameter beforehand.
 #[derive(Debug, Clone, Copy, PartialEq)]

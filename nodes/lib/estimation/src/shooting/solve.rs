@@ -205,9 +205,10 @@ fn step<M: Rollout>(
     None
 }
 
-/// The step within bounds that lowers s^T H s/2 + g^T s most: what would leave is held at its bound, and the others go where that leaves them (an active
+/// The step within bounds that lowers s^T H s/2 + g^T s most, for a gradient g and information H: what would leave is held at its bound, and the others go where that leaves them (an active
 /// set: Nocedal and Wright, Numerical Optimization, 16.5). Cut off there instead, they go on as if it had moved. `None` where H is not positive definite.
-fn within(
+#[must_use]
+pub fn within(
     information: &DMatrix<f64>,
     gradient: &DVector<f64>,
     low: &DVector<f64>,
