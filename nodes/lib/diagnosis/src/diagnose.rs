@@ -289,18 +289,20 @@ pub(crate) fn fit_tires(
     const FIRST: usize = 8;
     const REST: usize = 17;
     let windows = windows.thinned(SEARCH_WINDOWS);
+    // Which start leads on shows on a part of them.
+    let some = windows.thinned(SEARCH_WINDOWS / 3);
     let best = GENERIC
         .iter()
         .map(|&start| {
             let engine =
                 Engine::new(recording, vehicle, OwnTires::from_parameters(&start), TireTrust::free());
-            let state = engine.fit(&[], &engine.blank(), None, &windows, FIRST);
+            let state = engine.fit(&[], &engine.blank(), None, &some, FIRST);
             (engine, state)
         })
         .filter(|(_, state)| state.finite)
         .min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
     let (engine, state) = best.ok_or(GapError::NotFinite)?;
-    let state = engine.fit(&[], &state.parameters, Some(state.starts), &windows, REST);
+    let state = engine.fit(&[], &state.parameters, None, &windows, REST);
     if state.finite { Ok(state.tires()) } else { Err(GapError::NotFinite) }
 }
 

@@ -8,6 +8,7 @@
 //!    terms likewise. All configurations are compared ([`selection`](gripsight_estimation::selection)): an effect that is the cause makes its site's
 //!    flexible terms needless; a stand-in does not.
 //! 4. The most probable model is fitted by rollouts, and everything linearised anew around it, until the configuration stays.
+//! 5. Data that nothing was fitted to decide what stays in it (`stated`), one part after the other (`moves`).
 
 use nalgebra::DVector;
 

@@ -10,8 +10,8 @@ use crate::stated::{Asked, Needed, Tried};
 /// Parts, those that are foretold to be needed most or least, that a fit is asked of.
 const FITTED: usize = 3;
 
-/// Times at most that effects are taken in and out.
-const TURNS: usize = 4;
+/// Times at most that effects are taken in and out, and that it is asked for again beside others.
+pub(crate) const TURNS: usize = 4;
 
 /// A configuration from which everything was taken that is not needed.
 pub(crate) struct Weeded {
@@ -171,12 +171,12 @@ impl Asked<'_, '_, '_, '_> {
     /// Puts in each effect's place what does nearly the same, and keeps what predicts best; each effect's rivals with their odds over its.
     pub(crate) fn with_the_likeliest_of_alike(
         &self,
-        mut now: Tried,
-        simpler: Vec<(usize, Tried)>,
+        Weeded { left, simpler, .. }: &Weeded,
     ) -> (Tried, Vec<Needed>) {
         let effect = |term: usize| self.around.columns.effects[term - FIRST];
+        let mut now = left.clone();
         let mut out = Vec::with_capacity(simpler.len());
-        for (term, lacking) in simpler {
+        for (term, lacking) in simpler.iter().cloned() {
             let alike = |&t: &usize| {
                 effect(term).spec().alike.contains(&effect(t))
                     || effect(t).spec().alike.contains(&effect(term))
@@ -223,7 +223,73 @@ fn does_most_of(neither: f64, effect: f64, free: f64) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use gripsight_estimation::split;
+    use gripsight_model::EffectId;
+
     use super::*;
+    use crate::budget::Scorer;
+    use crate::testing::{configured, with_around};
+
+    /// What a move makes of some effects, with all free terms of a site or without, in a drive with a lag: the effects that are there then, and whether
+    /// free terms are.
+    fn moved(
+        effects: &[EffectId],
+        free: Option<Site>,
+        by: impl FnOnce(&Asked<'_, '_, '_, '_>, Tried) -> Tried,
+    ) -> (Vec<EffectId>, bool) {
+        with_around(0.06, |around, weighed| {
+            let columns = around.columns;
+            let scorer = Scorer::new(around.engine, None, &split(around.engine.recording, true));
+            let asked = Asked::new(around, &columns.effects, &scorer);
+            let mut chosen = configured(around, effects);
+            for column in free.into_iter().flat_map(|site| columns.of_site(site)) {
+                chosen[columns.term_of_flexible(column)] = 1;
+            }
+            let to = by(&asked, asked.fitted_from(&chosen, around, weighed).unwrap());
+            let there = asked.effects(&to, true).into_iter().map(|i| columns.effects[i - FIRST]).collect();
+            (there, Site::ALL.into_iter().any(|site| !asked.free_terms(&to, site).is_empty()))
+        })
+    }
+
+    #[test]
+    fn what_is_likely_is_taken_in_and_what_is_not_is_taken_out() {
+        let lag = vec![EffectId::SteeringLag];
+        assert_eq!(moved(&[], None, |asked, now| asked.with_likely_effects(now)), (lag.clone(), false));
+        let both = [EffectId::SteeringLag, EffectId::VyBias];
+        let without = |asked: &Asked<'_, '_, '_, '_>, now| {
+            let (left, simpler) = asked.without_unlikely_effects(now);
+            let [(term, lacking)] = &simpler[..] else { panic!("{}", simpler.len()) };
+            assert!(left.chosen[*term] == 1 && lacking.chosen[*term] == 0 && lacking.cost > left.cost);
+            left
+        };
+        assert_eq!(moved(&both, None, without), (lag, false));
+    }
+
+    #[test]
+    fn free_terms_go_where_they_close_too_little_and_make_room_for_the_effect_that_does_as_well() {
+        let lag = vec![EffectId::SteeringLag];
+        let needless = moved(&lag, Some(Site::Vy), |asked, now| asked.without_needless_free_terms(now));
+        assert_eq!(needless, (lag.clone(), false));
+        let stood_in = moved(&[], Some(Site::Steering), |asked, now| asked.without_needless_free_terms(now));
+        assert_eq!(stood_in, (Vec::new(), true));
+        let named = moved(&[], Some(Site::Steering), |asked, now| asked.with_effects_for_free_terms(now).0);
+        assert_eq!(named, (lag, false));
+    }
+
+    #[test]
+    fn of_effects_that_are_alike_the_one_that_predicts_best_stays() {
+        let relaxation = [EffectId::TireRelaxation];
+        let (there, _) = moved(&relaxation, None, |asked, now| {
+            let (left, simpler) = asked.without_unlikely_effects(now);
+            let weeded = Weeded { left, simpler, taken: Vec::new() };
+            let (now, needed) = asked.with_the_likeliest_of_alike(&weeded);
+            let [Needed { term, rivals, .. }] = &needed[..] else { panic!("{}", needed.len()) };
+            assert_eq!(now.chosen[*term], 1);
+            assert!(rivals.iter().all(|(_, odds)| *odds < 1.0), "{rivals:?}");
+            now
+        });
+        assert_eq!(there, [EffectId::SteeringLag]);
+    }
 
     #[test]
     fn an_effect_that_leaves_a_tenth_of_what_free_terms_explain_is_the_cause_and_one_that_leaves_a_fifth_is_not()

@@ -14,6 +14,7 @@ use crate::decisions;
 use crate::discrepancy::Discrepancy;
 use crate::infer::FIRST;
 use crate::joint::Weighed;
+use crate::moves::TURNS;
 use crate::near::Near;
 use crate::statement::Statement;
 
@@ -70,14 +71,7 @@ impl Around<'_, '_> {
         alone: Option<Vec<usize>>,
         scorer: &Scorer<'_>,
     ) -> Option<Stated> {
-        let asked = Asked {
-            around: self,
-            library,
-            scorer,
-            fits: RefCell::default(),
-            nears: RefCell::default(),
-            starts: OnceLock::new(),
-        };
+        let asked = Asked::new(self, library, scorer);
         let near = Near::to(self, library, &fitted)?;
         let nothing = asked.fitted_from(&vec![0; start.len()], self, weighed)?;
         let mut now = asked.fitted_from(&start, &near.around(self), &near.weighed)?;
@@ -94,12 +88,22 @@ impl Around<'_, '_> {
         if least < weeded.left.cost {
             weeded = asked.weeded(nothing)?;
         }
-        let (now, simpler) = asked.with_the_likeliest_of_alike(weeded.left, weeded.simpler);
-        let (beside, whole) = asked.with_what_is_left(&now, &weeded.taken);
+        let (mut now, mut needed) = asked.with_the_likeliest_of_alike(&weeded);
+        let mut taken = weeded.taken;
+        // Beside another one of those that are alike something else may be needed.
+        for _ in 0..TURNS {
+            if now.chosen == weeded.left.chosen {
+                break;
+            }
+            weeded = asked.weeded(now)?;
+            (now, needed) = asked.with_the_likeliest_of_alike(&weeded);
+            taken.extend(&weeded.taken);
+        }
+        let (beside, whole) = asked.with_what_is_left(&now, &taken);
         let near = asked.near(&whole)?;
         let around = near.around(self);
         let discrepancy = Discrepancy::of(&around, &near.weighed.total, &whole.chosen, &whole.fitted.values)?;
-        let statements = simpler
+        let statements = needed
             .into_iter()
             .map(|Needed { term, lacking, rivals }| Statement {
                 term,
@@ -129,7 +133,12 @@ pub(crate) struct Asked<'q, 'p, 'a, 's> {
     starts: OnceLock<Vec<[f64; 2]>>,
 }
 
-impl Asked<'_, '_, '_, '_> {
+impl<'q, 'p, 'a, 's> Asked<'q, 'p, 'a, 's> {
+    pub(crate) fn new(around: &'q Around<'p, 'a>, library: &'q [EffectId], scorer: &'q Scorer<'s>) -> Self {
+        let (fits, nears) = (RefCell::default(), RefCell::default());
+        Self { around, library, scorer, fits, nears, starts: OnceLock::new() }
+    }
+
     /// Logarithm of how much likelier held-out data are by one model than by a simpler one.
     pub(crate) fn log_ratio(&self, simpler: f64, fuller: f64) -> f64 {
         0.5 * (simpler - fuller) / self.around.dispersion
@@ -172,7 +181,12 @@ impl Asked<'_, '_, '_, '_> {
     }
 
     /// The same from where everything was linearised.
-    fn fitted_from(&self, chosen: &[usize], around: &Around<'_, '_>, weighed: &Weighed) -> Option<Tried> {
+    pub(crate) fn fitted_from(
+        &self,
+        chosen: &[usize],
+        around: &Around<'_, '_>,
+        weighed: &Weighed,
+    ) -> Option<Tried> {
         let terms = around.lacking(chosen);
         let around = Around { terms: &terms, ..*around };
         let tried = |ended: Ended| {

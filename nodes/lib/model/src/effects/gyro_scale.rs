@@ -2,7 +2,7 @@
 
 use gripsight_vehicle::Real;
 
-use super::{Effect, EffectSpec, Figure, both_sides, spec};
+use super::{Effect, EffectId, EffectSpec, Figure, both_sides, spec};
 use crate::site::Site;
 use crate::terms::Outputs;
 
@@ -12,6 +12,8 @@ pub(super) struct GyroScale;
 
 impl Effect for GyroScale {
     const SPEC: EffectSpec = EffectSpec {
+        // The curvature that the steering asks for is the yaw rate over v_x: forces alone tell the scales apart.
+        alike: &[EffectId::VxScale],
         figure: Some(Figure { name: "yaw_rate_scale", stated: |_| Some(1.0), value: |_, scale| 1.0 + scale }),
         ..spec(
             "gyro_scale",
