@@ -175,7 +175,8 @@ impl Pair {
     }
 
     /// Whether the later drive is likelier to be of this model than of one with fewer terms, by what either leaves of it and how far it takes what is known
-    /// beforehand (tires that stand in for another grip); and the drives contradict each other by no more.
+    /// beforehand (tires that stand in for another grip); and the drives contradict each other by no more, but for
+    /// what counts as the same.
     fn is_likelier(&self, simpler: &Self) -> bool {
         let contradiction = |of: &Self| of.compared.dispersion;
         let left = (simpler.later.weighed.cost - self.later.weighed.cost) / self.later.dispersion;

@@ -11,7 +11,7 @@
 
 use gripsight_estimation::selection::{Quadratic, Term};
 use gripsight_estimation::shooting::within;
-use gripsight_model::{EffectId, Site};
+use gripsight_model::EffectId;
 use nalgebra::{DMatrix, DVector};
 
 use crate::around::{Around, Refined};
@@ -29,18 +29,18 @@ pub(crate) struct Near {
 }
 
 impl Near {
+    /// Linearises around `fitted`; `None` where its model runs away.
     pub(crate) fn to(around: &Around<'_, '_>, library: &[EffectId], fitted: &Refined) -> Option<Self> {
         let Around { engine, columns, windows, .. } = *around;
         let (mut values, starts) = (fitted.values.clone(), fitted.starts.clone());
-        const NONE: [Site; 0] = [];
-        let mut joint = Joint::of_sites(engine, columns, &values, &starts, windows, &NONE)?;
+        let mut joint = Joint::of_sites(engine, columns, &values, &starts, windows, &[])?;
         differences(engine, columns, &mut values, &starts, windows, &mut joint);
         let terms = terms(engine, columns, &values, library);
         let weighed = joint.weighed(&vec![1.0; engine.sigma.len()]);
         Some(Self { values, starts, terms, weighed })
     }
 
-    /// Configurations are fitted from here.
+    /// As a place that configurations are fitted from.
     pub(crate) fn around<'p, 'a>(&'p self, base: &Around<'p, 'a>) -> Around<'p, 'a> {
         Around { terms: &self.terms, values: &self.values, starts: &self.starts, ..*base }
     }

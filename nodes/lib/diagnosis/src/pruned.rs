@@ -8,9 +8,9 @@ use crate::around::{Around, Refined};
 use crate::infer::FIRST;
 
 /// Loss of the linear evidence up to which rollouts are asked whether an effect is needed.
-pub(crate) const CLEAR: f64 = 40.0;
+const CLEAR: f64 = 40.0;
 /// Loss up to which a part is asked for again once another one has gone.
-pub(crate) const DOUBTFUL: f64 = 10.0;
+const DOUBTFUL: f64 = 10.0;
 
 /// A configuration of which nothing is needless.
 pub(crate) struct Pruned {

@@ -195,6 +195,8 @@ impl<'q, 'p, 'a, 's> Asked<'q, 'p, 'a, 's> {
         };
         let found = around.by_rollouts_to_the_end(&weighed.total, chosen).map(tried);
         self.fits.borrow_mut().insert(chosen.to_vec(), found.clone());
+        // With a patch at another place this is another fit.
+        self.nears.borrow_mut().remove(chosen);
         found
     }
 
