@@ -170,7 +170,9 @@ impl Joint {
     pub(crate) fn promise(&self, engine: &Engine<'_>, slopes: &[Vec<f64>]) -> f64 {
         let one = vec![1.0; self.channels];
         let (mut product, mut square) = (0.0, 0.0);
-        for (part, slope) in self.parts.iter().zip(slopes) {
+        // Where nothing comes of it nothing is promised.
+        let felt = self.parts.iter().zip(slopes).filter(|(_, slope)| slope.iter().any(|s| *s != 0.0));
+        for (part, slope) in felt {
             let column = DMatrix::from_fn(part.kept.len(), 1, |r, _| {
                 slope[part.kept[r]] / engine.sigma[part.channel[r]]
             });
@@ -240,9 +242,8 @@ impl Joint {
 
     /// Mean square of what a step leaves of each channel, in units of the engine's sigma: median over windows.
     pub(crate) fn left_by_channel(&self, step: &DVector<f64>) -> Vec<f64> {
-        let mut squares = vec![Vec::with_capacity(self.parts.len()); self.channels];
         let one = vec![1.0; self.channels];
-        for part in &self.parts {
+        let of_part = |part: &Part| {
             let (residual, jacobian, _) = part.projected(&one);
             let left = residual - jacobian * step;
             let mut sums = vec![(0.0, 0.0); self.channels];
@@ -250,6 +251,10 @@ impl Joint {
                 sums[c].0 += v * v;
                 sums[c].1 += 1.0;
             }
+            sums
+        };
+        let mut squares = vec![Vec::with_capacity(self.parts.len()); self.channels];
+        for sums in self.parts.par_iter().map(of_part).collect::<Vec<_>>() {
             for (c, (s, n)) in sums.into_iter().enumerate().filter(|(_, s)| s.1 > 0.0) {
                 squares[c].push(s / n);
             }

@@ -13,6 +13,9 @@ const FITTED: usize = 3;
 /// Times at most that effects are taken in and out, and that it is asked for again beside others.
 pub(crate) const TURNS: usize = 4;
 
+/// Log odds from which a forecast is not put to a fit before the last turn, in which all are: this spares work, and decides nothing.
+const CLEAR: f64 = 100.0;
+
 /// A configuration from which everything was taken that is not needed.
 pub(crate) struct Weeded {
     pub(crate) left: Tried,
@@ -31,9 +34,15 @@ impl Asked<'_, '_, '_, '_> {
             let fuller = self.with_likely_effects(now);
             let full = fuller.chosen.clone();
             // What stood in for the effects is no longer needed beside them, and what it kept out may be likely without it.
-            let (left, simpler) = self.without_unlikely_effects(self.without_needless_free_terms(fuller));
+            let (left, _) = self.without_unlikely_effects(self.without_needless_free_terms(fuller), CLEAR);
             turns += 1;
-            if left.chosen == full || turns == TURNS {
+            if left.chosen != full && turns < TURNS {
+                now = left;
+                continue;
+            }
+            let settled = left.chosen.clone();
+            let (left, simpler) = self.without_unlikely_effects(left, f64::INFINITY);
+            if left.chosen == settled || turns >= TURNS {
                 return Some(Weeded { left, simpler, taken });
             }
             now = left;
@@ -147,13 +156,16 @@ impl Asked<'_, '_, '_, '_> {
     }
 
     /// Takes out the effects that all data make less likely than not, those first that are foretold to be needed least; what is left, and that without each
-    /// effect.
-    fn without_unlikely_effects(&self, mut now: Tried) -> (Tried, Vec<(usize, Tried)>) {
+    /// effect. No fit is asked of one whose log odds are foretold to be `clear` or more.
+    fn without_unlikely_effects(&self, mut now: Tried, clear: f64) -> (Tried, Vec<(usize, Tried)>) {
         loop {
             let moves = self.effects(&now, true).into_iter().map(|i| (i, without(&now, &[i])));
             let mut simpler = Vec::new();
             let mut unlikely = None;
-            for (i, to, _) in self.ranked(&now, moves) {
+            let ranked = self.ranked(&now, moves);
+            for (i, to, _) in
+                ranked.into_iter().filter(|(i, _, left)| self.log_odds(*i, *left, now.cost) < clear)
+            {
                 let Some(lacking) = self.fitted(&to, &now) else { continue };
                 if self.log_odds(i, lacking.cost, now.cost) < 0.0 {
                     unlikely = Some(lacking);
@@ -257,7 +269,7 @@ mod tests {
         assert_eq!(moved(&[], None, |asked, now| asked.with_likely_effects(now)), (lag.clone(), false));
         let both = [EffectId::SteeringLag, EffectId::VyBias];
         let without = |asked: &Asked<'_, '_, '_, '_>, now| {
-            let (left, simpler) = asked.without_unlikely_effects(now);
+            let (left, simpler) = asked.without_unlikely_effects(now, f64::INFINITY);
             let [(term, lacking)] = &simpler[..] else { panic!("{}", simpler.len()) };
             assert!(left.chosen[*term] == 1 && lacking.chosen[*term] == 0 && lacking.cost > left.cost);
             left
@@ -280,7 +292,7 @@ mod tests {
     fn of_effects_that_are_alike_the_one_that_predicts_best_stays() {
         let relaxation = [EffectId::TireRelaxation];
         let (there, _) = moved(&relaxation, None, |asked, now| {
-            let (left, simpler) = asked.without_unlikely_effects(now);
+            let (left, simpler) = asked.without_unlikely_effects(now, f64::INFINITY);
             let weeded = Weeded { left, simpler, taken: Vec::new() };
             let (now, needed) = asked.with_the_likeliest_of_alike(&weeded);
             let [Needed { term, rivals, .. }] = &needed[..] else { panic!("{}", needed.len()) };

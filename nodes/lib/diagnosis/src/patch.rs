@@ -83,7 +83,8 @@ pub(crate) fn likeliest(
 ) -> Option<([f64; 2], Vec<Vec<f64>>)> {
     let range = columns.of_effect(effect)?;
     let depth = engine.size(&effect.spec().parameters[0]);
-    let gains = LENGTHS.into_iter().flat_map(places).map(|[start, length]| {
+    let tried: Vec<[f64; 2]> = LENGTHS.into_iter().flat_map(places).collect();
+    let gains = tried.into_par_iter().map(|[start, length]| {
         let mut placed = values.to_vec();
         placed[range.start + 1] = start;
         placed[range.start + 2] = length;
@@ -97,6 +98,7 @@ pub(crate) fn likeliest(
             quotient(engine, columns, &placed, starts, (windows, &there), here, (effect, range.start), depth);
         (joint.promise(engine, &slopes), [start, length], slopes)
     });
-    let best = gains.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(gain, ..)| *gain > 0.0)?;
+    let gains: Vec<_> = gains.collect();
+    let best = gains.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(gain, ..)| *gain > 0.0)?;
     Some((best.1, best.2))
 }
