@@ -16,8 +16,9 @@ import sys
 from pathlib import Path
 
 HEAD = ["batch", "case", "family", "car", "kind", "effects", "severity", "race_pace", "left_out", "contained", "verdict", "names", "sizes_inside", "sizes"]
-HEAD += ["verdict_other", "names_other", "sizes_inside_other", "sizes_other"]
+HEAD += ["verdict_other", "names_other", "sizes_inside_other", "sizes_other", "site"]
 SCOPE = 2.0
+LIKELY = 0.5
 Z = 1.96
 
 
@@ -36,8 +37,24 @@ def said(path, effects):
     return gap["verdict"], [e["name"] for e in accepted], inside, total
 
 
+def sites(path):
+    """The sites that are likelier than not, and where which mechanism is listed."""
+    listed = json.loads(path.read_text()).get("sites", [])
+    likely = {s["name"] for s in listed if (s["probability"] or 0.0) >= LIKELY}
+    return likely, [(m["name"], s["name"]) for s in listed for m in s["mechanisms"]]
+
+
+def with_sites(rows, blamed, listed):
+    """Of each row whether a site of its first effect is likelier than not; the sites of an effect are those at which any verdict lists it."""
+    for row, likely in zip(rows, blamed, strict=True):
+        first = row["effects"].split()[:1]
+        of_first = {site for name, site in listed if [name] == first}
+        row["site"] = bool(likely & of_first) if of_first else ""
+
+
 def collected(batches):
     rows, missing = [], 0
+    blamed, listed = [], set()
     for labels, *verdicts in batches:
         for case in json.loads(Path(labels).read_text())["cases"]:
             paths = [Path(v) / case["case"] / "gap.json" if v != "-" else None for v in verdicts]
@@ -52,7 +69,11 @@ def collected(batches):
             for path in paths:
                 verdict, names, inside, total = said(path, effects) if path else ("", [], 0, 0)
                 row += [verdict, " ".join(names), inside, total]
-            rows.append(dict(zip(HEAD, row, strict=True)))
+            rows.append(dict(zip(HEAD, [*row, ""], strict=True)))
+            likely, at = sites(paths[0])
+            blamed.append(likely)
+            listed.update(at)
+    with_sites(rows, blamed, listed)
     return rows, missing
 
 
@@ -114,6 +135,8 @@ def report(rows, family):
     of = [r for r in rows if r["family"] == family]
     of_kind = lambda *kinds: [r for r in of if r["kind"] in kinds and in_scope(r)]
     print(f"\n{family}: {len(of)} cases\n\n| | the one | the other | only one right, only the other; McNemar |\n| --- | --- | --- | --- |")
+    told = [r["site"] for r in of_kind("single") if r["site"] != ""]
+    print(f"| one effect: its site blamed | {wilson(sum(told), len(told))} | | |")
     line("one effect: named first", of_kind("single"), first)
     line("two effects: both named", of_kind("pair"), all_named)
     line("left out: `none_of_these`", of_kind("deleted"), none_of_these)

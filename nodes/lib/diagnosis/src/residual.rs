@@ -40,6 +40,8 @@ pub(crate) struct Residual {
     network: ResidualNetwork,
     /// How much of its output is used.
     share: f64,
+    /// The least and the greatest that each output was taught: what a network says beyond is no knowledge, and drives a rollout off.
+    taught: [[f64; 2]; OUTPUTS],
 }
 
 impl Residual {
@@ -51,10 +53,11 @@ impl Residual {
         let lessons = Lessons::of(engine, base, windows);
         let validation = of_length(engine.recording, &windows.of_blocks(is_validation), HORIZON_S);
         let mut best: Option<(f64, Self)> = None;
+        let taught = lessons.range();
         let (measured, predicted) = rayon::join(|| lessons.teach(false), || lessons.teach(true));
         for network in [measured.ok()?, predicted.ok()?] {
             for share in SHARES {
-                let residual = Self { network: network.clone(), share };
+                let residual = Self { network: network.clone(), share, taught };
                 let model = ExtendedModel { residual: Some(&residual), ..engine.model(&base.effects, None) };
                 let error: f64 =
                     engine.score_model(&model, &base.parameters, &validation).squares.iter().sum();
@@ -120,7 +123,9 @@ impl Stream<'_> {
         if self.residual.network.step(&mut self.memory, &input, &mut self.output).is_err() {
             self.output = [f64::NAN; OUTPUTS];
         }
-        self.output.iter_mut().for_each(|o| *o *= self.residual.share);
+        for (output, [least, greatest]) in self.output.iter_mut().zip(self.residual.taught) {
+            *output = self.residual.share * output.clamp(least, greatest);
+        }
     }
 }
 
@@ -176,6 +181,14 @@ impl Lessons {
         Self(lessons)
     }
 
+    /// The least and the greatest target of each output; those that nothing is known of are 0.
+    fn range(&self) -> [[f64; 2]; OUTPUTS] {
+        std::array::from_fn(|i| {
+            let targets = self.0.iter().flat_map(|lesson| &lesson.targets[i]);
+            targets.fold([0.0; 2], |[least, greatest], t| [t.min(least), t.max(greatest)])
+        })
+    }
+
     /// A network taught on the measured states, or on the predicted ones as well.
     fn teach(&self, predicted: bool) -> Result<ResidualNetwork, gripsight_s4::Error> {
         let training = self.set(predicted, false)?;
@@ -227,4 +240,35 @@ fn acceleration(
     }
     let step = information.cholesky()?.solve(&gradient);
     step.iter().all(|v| v.is_finite()).then_some([step[2], step[3]])
+}
+
+#[cfg(test)]
+mod tests {
+    use gripsight_estimation::split;
+    use gripsight_vehicle::VehicleParameters;
+
+    use super::*;
+    use crate::testing::{drive, tires};
+    use crate::trust::TireTrust;
+
+    #[test]
+    fn far_from_what_it_was_taught_a_network_says_no_more_than_it_was_taught() {
+        const LAG_S: f64 = 0.06;
+        let vehicle = VehicleParameters::f1tenth();
+        let recording = drive(&vehicle, LAG_S);
+        let engine = Engine::new(&recording, &vehicle, tires(), TireTrust::file());
+        let windows = split(&recording, true).training;
+        let null = engine.fit(&[], &engine.blank(), None, &windows, 15);
+        let residual = Residual { share: 1.0, ..Residual::learned(&engine, &null, &windows).unwrap() };
+        let window = windows.windows[0];
+        let mut stream = residual.stream(&recording.runs[window.segment], &window);
+        let mut at_the_end = false;
+        for far in [-1e6, 1e6] {
+            for (said, [least, greatest]) in stream.next(0, [far, -far]).into_iter().zip(residual.taught) {
+                assert!((least..=greatest).contains(&said), "{said} of {least} to {greatest}");
+                at_the_end |= said == least || said == greatest;
+            }
+        }
+        assert!(at_the_end);
+    }
 }

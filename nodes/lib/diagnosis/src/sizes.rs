@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use gripsight_estimation::Windows;
 use gripsight_estimation::selection::{Quadratic, Term};
+use gripsight_estimation::shooting::within;
 use gripsight_model::EffectId;
 use nalgebra::{DMatrix, DVector};
 
@@ -107,8 +108,9 @@ struct Stepped {
     sigma: Vec<f64>,
 }
 
-/// The step of a configuration's columns, with their standard deviations: the larger of those of the posterior and of a
-/// sandwich with blocks as clusters (errors that are alike within a block), which has a t distribution over so few blocks.
+/// The step of a configuration's columns within their bounds, with their standard deviations: the larger of those of the posterior and of a
+/// sandwich with blocks as clusters (errors that are alike within a block), which has a t distribution over so few blocks. Both are of columns that no
+/// bound holds: where the little of an effect ends is no knowledge of what is beside it.
 fn stepped(weighed: &Weighed, phi: f64, active: &[Active]) -> Option<Stepped> {
     let n = active.len();
     let prior = DVector::from_iterator(n, active.iter().map(|a| a.precision));
@@ -116,21 +118,22 @@ fn stepped(weighed: &Weighed, phi: f64, active: &[Active]) -> Option<Stepped> {
         |q: &Quadratic| DMatrix::from_fn(n, n, |r, c| q.information[(active[r].column, active[c].column)]);
     let slope = |q: &Quadratic| DVector::from_iterator(n, active.iter().map(|a| q.gradient[a.column]));
     let precision = info(&weighed.total) / phi + DMatrix::from_diagonal(&prior);
+    let gradient = slope(&weighed.total) / phi - DVector::from_fn(n, |i, _| prior[i] * active[i].offset);
+    let [low, high] = [0, 1].map(|side| DVector::from_iterator(n, active.iter().map(|a| a.bounds[side])));
+    let step = within(&precision, &gradient, &low, &high)?;
     let inverse = precision.cholesky()?.inverse();
-    let pull = DVector::from_fn(n, |i, _| prior[i] * active[i].offset) - slope(&weighed.total) / phi;
-    let mut step = &inverse * pull;
+    let unbound = -(&inverse * gradient);
     let mut scatter = DMatrix::from_diagonal(&prior);
     let blocks = weighed.blocks.len() as f64;
     let few = blocks / (blocks - 1.0).max(1.0) / (phi * phi);
     for block in &weighed.blocks {
-        let score = slope(block) + info(block) * &step;
+        let score = slope(block) + info(block) * &unbound;
         scatter += &score * score.transpose() * few;
     }
     let sandwich = &inverse * scatter * &inverse;
     let wider = ninety_of_t(blocks - 1.0) / NINETY;
     let sigma = |i: usize| inverse[(i, i)].max(0.0).sqrt().max(wider * sandwich[(i, i)].max(0.0).sqrt());
     let sigma = (0..n).map(sigma).collect();
-    step.iter_mut().zip(active).for_each(|(s, a)| *s = s.clamp(a.bounds[0], a.bounds[1]));
     Some(Stepped { step, inverse, sigma })
 }
 
@@ -237,6 +240,36 @@ pub(crate) fn reported(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_its_bound_holds_moves_nothing_beside_it() {
+        // Two columns that are alike, in two blocks; what is left asks for less of the second than nothing.
+        const INFORMATION: [f64; 4] = [10.0, 8.0, 8.0, 10.0];
+        let block = |gradient: [f64; 2]| Quadratic {
+            information: DMatrix::from_row_slice(2, 2, &INFORMATION),
+            gradient: DVector::from_row_slice(&gradient),
+        };
+        let blocks = vec![block([-1.0, 3.0]), block([-1.2, 3.2])];
+        let total = Quadratic {
+            information: blocks.iter().map(|b| &b.information).sum(),
+            gradient: blocks.iter().map(|b| &b.gradient).sum(),
+        };
+        let weighed = Weighed { total, blocks, cost: 0.0, residuals: 0.0 };
+        let stepped = |low: f64| {
+            let free = Active { column: 0, precision: 0.0, offset: 0.0, bounds: [-9.0, 9.0] };
+            stepped(
+                &weighed,
+                1.0,
+                &[free, Active { column: 1, precision: 0.0, offset: 0.0, bounds: [low, 9.0] }],
+            )
+            .unwrap()
+        };
+        let (open, held) = (stepped(-9.0), stepped(0.0));
+        assert!(open.step[1] < -0.5 && open.step[0] > 0.5, "{:?}", open.step);
+        assert_eq!(held.step[1], 0.0);
+        approx::assert_relative_eq!(held.step[0], 2.2 / 20.0, epsilon = 1e-12);
+        assert_eq!((held.sigma, held.inverse), (open.sigma, open.inverse));
+    }
 
     #[test]
     fn the_spread_of_each_effect_is_that_of_the_development_cases() {
