@@ -2,9 +2,12 @@
 
 import csv
 import math
+import sys
 from pathlib import Path
 
 RESULTS = Path(__file__).parent
+sys.path.insert(0, str(RESULTS / "withheld"))
+import paired  # noqa: E402
 README = (RESULTS.parents[1] / "README.md").read_text(encoding="utf-8")
 
 
@@ -45,28 +48,17 @@ def test_a_recording_and_itself_with_an_effect():
 def test_the_blind_check():
     cases = rows("withheld/sealed.csv")
     said = said_of("withheld/README.md")
-
-    def in_scope(row):
-        severity = [float(s) for s in row["severity"].split()]
-        return row["family"] == "foreign" or not severity or (row["race_pace"] == "True" and min(severity) >= 2)
-
-    def named(row):
-        own = row["contained"].split()
-        return [name for name in row["names"].split() if name not in own or name in row["effects"].split()]
-
-    def of_kind(family, kind):
-        return [r for r in cases if r["family"] == family and r["kind"] == kind and in_scope(r)]
-
     without_cause = []
     for family in ("reference", "foreign"):
-        single, pairs, none = (of_kind(family, kind) for kind in ("single", "pair", "none"))
+        of = [r for r in cases if r["family"] == family]
+        single, pairs, none = ([r for r in of if r["kind"] == kind and paired.in_scope(r)] for kind in ("single", "pair", "none"))
         site = sum(r["site"] == "True" for r in single)
-        first = sum(named(r)[:1] == r["effects"].split() for r in single)
-        both = sum(set(r["effects"].split()) <= set(named(r)) for r in pairs)
+        first = sum(paired.first(r, "") for r in single)
+        both = sum(paired.all_named(r, "") for r in pairs)
         assert f"site right {site} of {len(single)}, named first {first} of {len(single)}, both of a pair {both} of {len(pairs)}" in said
-        inside, sizes = (sum(int(r[key]) for r in cases if r["family"] == family) for key in ("sizes_inside", "sizes"))
+        inside, sizes = (sum(int(r[key]) for r in of) for key in ("sizes_inside", "sizes"))
         assert f"{inside} of {sizes} sizes inside" in said
-        without_cause.append(f"{sum(bool(named(r)) for r in none)} of {len(none)}")
+        without_cause.append(f"{sum(paired.a_wrong_name(r, '') for r in none)} of {len(none)}")
     assert f"a name without any effect in {' and '.join(without_cause)}" in said
 
 

@@ -5,7 +5,8 @@
 
 OUT receives, as links, the first FIRST cases of CASES, of whatever kind, and of the others of the reference car those that a rate is asked of: an effect at
 twice its detection limit or more, at race pace. Cases of others' plants and of recordings are all in scope. The labels decide that, which `gripsight withheld
-make` wrote: no verdict is read. `--only none`: the first FIRST cases without effect, and no others. For a program from before `track_width_m` vehicle files are written without that line.
+make` wrote: no verdict is read. `--only none`: the first FIRST cases without effect, and no others. `--without-track-width`: vehicle files without that line, for
+a program from before it. OUT must be on the file system of CASES.
 """
 
 import argparse

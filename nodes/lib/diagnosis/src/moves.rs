@@ -274,7 +274,14 @@ mod tests {
             assert!(left.chosen[*term] == 1 && lacking.chosen[*term] == 0 && lacking.cost > left.cost);
             left
         };
-        assert_eq!(moved(&both, None, without), (lag, false));
+        assert_eq!(moved(&both, None, without), (lag.clone(), false));
+        // What is foretold to be needed beyond doubt is left to the last turn.
+        let in_a_turn = |asked: &Asked<'_, '_, '_, '_>, now| {
+            let (left, simpler) = asked.without_unlikely_effects(now, CLEAR);
+            assert!(simpler.is_empty());
+            left
+        };
+        assert_eq!(moved(&both, None, in_a_turn), (lag, false));
     }
 
     #[test]
